@@ -1,0 +1,48 @@
+//! The door between files and the core: precision and dimension become type parameters here, and nowhere else.
+//!
+//! | function | what |
+//! |---|---|
+//! | [`plan`] | a plan of a scenario |
+//! | [`improve`] | the same, from an earlier plan |
+//! | [`assess()`] | objective, violations and series of a plan, in double precision, from its written numbers alone |
+//! | [`landscape()`] | a metric over the domain at one time |
+//!
+//! The core keeps everything in fixed-size structures of the host's capacities, hundreds of kilobytes each. They
+//! live on the heap, but pass through the stack while they are built, several times over without optimisation. All
+//! work therefore runs in a thread of its own whose stack has [`STACK_BYTES`].
+
+mod assess;
+mod landscape;
+mod solve;
+
+pub use assess::{AgentSeries, Assessment, assess};
+pub use landscape::{Grid, View, landscape};
+pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};
+
+pub use quietpath_core::solver::Status;
+
+use quietpath_core::metrics::Sample;
+
+use crate::capacity;
+
+/// Stack of a planning thread, bytes: more than ten times the largest structures, host size in three dimensions and
+/// double precision, for the copies that unoptimised builds make. Pages that are not touched cost nothing.
+pub const STACK_BYTES: usize = 256 << 20;
+
+/// Runs `work` on a stack of [`STACK_BYTES`].
+fn on_large_stack<V: Send>(work: impl FnOnce() -> V + Send) -> V {
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work);
+        let done = thread.map(std::thread::ScopedJoinHandle::join);
+        match done {
+            Ok(Ok(value)) => value,
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(error) => panic!("the operating system gives no thread with {STACK_BYTES} bytes of stack: {error}"),
+        }
+    })
+}
+
+/// Scratch for all sensors.
+fn scratch<const DIM: usize>() -> Vec<Sample<f64, DIM>> {
+    vec![Sample::default(); capacity::SENSORS]
+}

@@ -1,0 +1,183 @@
+//! Planning a scenario file.
+
+use std::time::{Duration, Instant};
+
+use quietpath_core::solver::{self, Settings, Start, Status, Workspace};
+use quietpath_core::{Point, Real};
+
+use super::assess::trajectory;
+use super::{Assessment, assess};
+use crate::capacity::{AGENTS, HostTrajectory, NODES, SENSORS};
+use crate::file::plan::{AgentPlan, PlanTiming};
+use crate::file::{FileError, PlanFile, ScenarioFile};
+
+/// Memory of the planner, host size.
+pub type HostWorkspace<T, const DIM: usize> = Workspace<T, DIM, NODES, SENSORS, AGENTS>;
+
+/// The floating-point numbers that planning computes with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Single, as on a microcontroller.
+    F32,
+    /// Double.
+    #[default]
+    F64,
+}
+
+/// What to do with a scenario that asks to be planned in steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Rollout {
+    /// As the scenario says. Steps are not planned by this version, and so are refused.
+    #[default]
+    AsWritten,
+    /// In one piece, with every track known.
+    Once,
+}
+
+/// How to plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// The numbers to compute with.
+    pub precision: Precision,
+    /// Largest number of iterations; the planner's own choice where it is not given.
+    pub iterations: Option<usize>,
+    /// Time after which the best plan so far is returned. With one, the same call may give different plans.
+    pub deadline: Option<Duration>,
+    /// Steps or one piece.
+    pub rollout: Rollout,
+}
+
+/// A plan, and how it came about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planned {
+    /// The plan, ready to be written. Its objective is that of [`Planned::assessment`].
+    pub plan: PlanFile,
+    /// The plan, weighed in double precision from its written numbers.
+    pub assessment: Assessment,
+    /// Why the planner stopped.
+    pub status: Status,
+    /// Iterations done.
+    pub iterations: usize,
+    /// Evaluations of the objective.
+    pub evaluations: usize,
+}
+
+/// Plans a scenario, from the best of several starts.
+///
+/// `plan_seconds` of the plan is the time of the core's planning call alone. The objective is not what the core
+/// computed on its way, but what the plan as written is worth in double precision: in single precision the
+/// two differ by rounding, and a claim should be one that others can check.
+///
+/// # Errors
+/// A part of the scenario that this version does not plan, by its place in the file.
+pub fn plan(scenario: &ScenarioFile, options: &Options) -> Result<Planned, Box<FileError>> {
+    begin(scenario, options, None)
+}
+
+/// Plans a scenario from an earlier plan, such as that of a scenario nearby.
+///
+/// What comes out is no worse than the earlier plan where that is feasible in this scenario; where it is not, or has
+/// another number of intervals, this is [`plan`].
+///
+/// # Errors
+/// As [`plan`]; an earlier plan that does not have the shape of the scenario: see [`PlanFile::fits`].
+pub fn improve(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -> Result<Planned, Box<FileError>> {
+    earlier.fits("the earlier plan", scenario)?;
+    begin(scenario, options, Some(earlier))
+}
+
+fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>) -> Result<Planned, Box<FileError>> {
+    refuse_unplanned(scenario, options)?;
+    let (mut plan, status, iterations, evaluations) =
+        super::on_large_stack(|| match (options.precision, scenario.dimension) {
+            (Precision::F32, 3) => solve::<f32, 3>(scenario, options, earlier),
+            (Precision::F32, _) => solve::<f32, 2>(scenario, options, earlier),
+            (Precision::F64, 3) => solve::<f64, 3>(scenario, options, earlier),
+            (Precision::F64, _) => solve::<f64, 2>(scenario, options, earlier),
+        })?;
+    let assessment = assess(scenario, &plan, "the plan")?;
+    plan.objective = Some(assessment.objective);
+    Ok(Planned { plan, assessment, status, iterations, evaluations })
+}
+
+/// Refuses what the file can say and the core cannot hear; the core refuses the rest itself.
+fn refuse_unplanned(scenario: &ScenarioFile, options: &Options) -> Result<(), Box<FileError>> {
+    if scenario.rolling.is_some() && options.rollout == Rollout::AsWritten {
+        let help = "plan it in one piece, with every track known: `quietpath plan --once`, or leave [rolling] out";
+        return Err(scenario.error_at("rolling", "asks for planning in steps, which this version does not do", help));
+    }
+    Ok(())
+}
+
+type Solved = (PlanFile, Status, usize, usize);
+
+fn solve<T: Real, const DIM: usize>(
+    scenario: &ScenarioFile,
+    options: &Options,
+    earlier: Option<&PlanFile>,
+) -> Result<Solved, Box<FileError>> {
+    let problem = scenario.to_core::<T, DIM>()?;
+    let mut settings = Settings::<T>::default();
+    if let Some(iterations) = options.iterations {
+        settings.iterations = iterations;
+        settings.refinements = settings.refinements.min(iterations);
+    }
+    let mut workspace: Box<HostWorkspace<T, DIM>> = Box::new(Workspace::new());
+    let earlier = earlier.map(trajectory::<T, DIM>).transpose().map_err(|error| scenario.explain(&error))?;
+    let start = earlier.as_deref().map_or(Start::Global, Start::Given);
+    let begin = Instant::now();
+    let mut is_late = || options.deadline.is_some_and(|deadline| begin.elapsed() >= deadline);
+    let outcome = solver::plan(&problem.view(), &settings, start, &mut workspace, &mut is_late);
+    let plan_seconds = begin.elapsed().as_secs_f64();
+    let outcome = outcome.map_err(|error| scenario.explain(&error))?;
+    let plan = PlanFile {
+        status: Some(outcome.status.name().to_owned()),
+        timing: Some(PlanTiming { plan_seconds }),
+        ..written(scenario, workspace.best())
+    };
+    Ok((plan, outcome.status, outcome.iterations, outcome.evaluations))
+}
+
+/// A trajectory of the planner's equal intervals as a plan.
+fn written<T: Real, const DIM: usize>(scenario: &ScenarioFile, trajectory: &HostTrajectory<T, DIM>) -> PlanFile {
+    let nodes = trajectory.nodes();
+    let doubles = |values: &[T]| -> Vec<f64> { values.iter().take(nodes).map(|value| value.to_f64()).collect() };
+    let point = |position: &Point<T, DIM>| -> Vec<f64> { position.iter().map(|part| part.to_f64()).collect() };
+    let agents = scenario.agents.iter().zip(trajectory.active()).map(|(entry, track)| {
+        let mut path: Vec<Vec<f64>> = track.path.iter().take(nodes).map(point).collect();
+        // Start and goal are exact in the file's numbers, which single precision rounds.
+        for (end, exact) in [(0, &entry.start), (nodes.saturating_sub(1), &entry.goal)] {
+            let is_rounded =
+                |position: &Vec<f64>| position.iter().zip(exact).all(|(a, b)| *a == T::real(*b).to_f64());
+            if let Some(position) = path.get_mut(end).filter(|position| is_rounded(position)) {
+                position.clone_from(exact);
+            }
+        }
+        AgentPlan {
+            name: entry.name.clone(),
+            path,
+            jam: entry.jammer.is_some().then(|| doubles(&track.jam)),
+            azimuth: entry.jammer.is_some().then(|| doubles(&track.azimuth)),
+            dropout: entry.dropout.is_some().then(|| doubles(&track.dropout)),
+        }
+    });
+    PlanFile {
+        scenario: scenario.name.clone(),
+        start_time: scenario.start_time,
+        duration: trajectory.duration().to_f64(),
+        agents: agents.collect(),
+        ..PlanFile::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planning::STACK_BYTES;
+
+    #[test]
+    fn the_stack_holds_the_largest_structures_many_times() {
+        let largest = size_of::<HostWorkspace<f64, 3>>() + size_of::<HostTrajectory<f64, 3>>();
+        assert!(largest * 10 < STACK_BYTES, "{largest} bytes");
+    }
+}

@@ -1,0 +1,112 @@
+//! Second derivatives of the combined probabilities of detection and of a false alarm.
+//!
+//! Both are 1 less the product of the sensors' 1 - s_j, s_j = (1 - theta) p_j. The product is carried as a jet, so that
+//! a sensor with s_j = 1 needs no division; the value itself is summed as s + s_j (1 - s), as elsewhere.
+//!
+//! Source: (19), (27), (54).
+
+use super::{Variables, offset};
+use crate::jet::Jet;
+use crate::math::Real;
+use crate::metrics::sample::{Sample, Situation};
+use crate::model::betrayal::betrayed_jet;
+use crate::model::detector::{self, Probability};
+use crate::scenario::{Betrayal, StoredSensor, View};
+
+/// One less the product so far.
+struct Union<T, const M: usize> {
+    value: T,
+    missed: Jet<T, M>,
+}
+
+impl<T: Real, const M: usize> Union<T, M> {
+    #[inline]
+    fn new() -> Self {
+        Self { value: T::zero(), missed: Jet::constant(T::one()) }
+    }
+
+    #[inline(always)]
+    fn include(&mut self, share: &Jet<T, M>) {
+        self.value += share.value * (T::one() - self.value);
+        let (before, missed) = (self.missed, &mut self.missed);
+        let kept = T::one() - share.value;
+        missed.value = before.value * kept;
+        for a in 0..M {
+            missed.gradient[a] = before.gradient[a] * kept - before.value * share.gradient[a];
+            for b in a..M {
+                missed.hessian[a][b] = before.hessian[a][b] * kept
+                    - before.value * share.hessian[a][b]
+                    - before.gradient[a] * share.gradient[b]
+                    - share.gradient[a] * before.gradient[b];
+            }
+        }
+    }
+
+    #[inline]
+    fn into_jet(self) -> Jet<T, M> {
+        let mut jet = self.missed.affine(-T::one(), T::one());
+        jet.value = self.value;
+        jet
+    }
+}
+
+#[inline(always)]
+pub(super) fn detected<T: Real, const DIM: usize, const M: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    samples: &[Sample<T, DIM>],
+    variables: &Variables,
+) -> Jet<T, M> {
+    let heard = Jet::variable(situation.dropout, variables.dropout).affine(-T::one(), T::one());
+    let level = Jet::variable(situation.level, variables.level);
+    let mut union = Union::new();
+    let pooling = &scenario.frame.pooling;
+    for (sensor, sample) in scenario.sensors.iter().zip(samples) {
+        let Some(model) = sensor.detection.as_ref().filter(|detection| !pooling.takes(detection)) else {
+            continue;
+        };
+        let square = offset(sample, variables).square(sample.square);
+        let Probability { value, slope, bend } = detector::detection(model, sample.square);
+        let silent = square.chain(value, slope, bend);
+        let loud = match situation.betrayal {
+            Betrayal::None => silent,
+            other => betrayed_jet(other, &sensor.jam, &silent, &level, &square),
+        };
+        let share =
+            if variables.dropout.is_some() { loud.times(&heard) } else { loud.affine(heard.value, T::zero()) };
+        union.include(&share);
+    }
+    union.into_jet()
+}
+
+/// A pool beside the sensors that decide for themselves.
+pub(super) fn beside<T: Real, const DIM: usize, const M: usize>(
+    alone: &Jet<T, M>,
+    pool: &Jet<T, M>,
+    situation: &Situation<T, DIM>,
+    variables: &Variables,
+) -> Jet<T, M> {
+    let heard = Jet::variable(situation.dropout, variables.dropout).affine(-T::one(), T::one());
+    let share = pool.times(&heard);
+    let mut jet = alone.times(&share).affine(-T::one(), T::zero());
+    jet.add(alone, T::one());
+    jet.add(&share, T::one());
+    jet.value = alone.value + share.value * (T::one() - alone.value);
+    jet
+}
+
+#[inline(always)]
+pub(super) fn alarmed<T: Real, const DIM: usize, const M: usize>(
+    sensors: &[StoredSensor<T, DIM>],
+    samples: &[Sample<T, DIM>],
+    variables: &Variables,
+) -> Jet<T, M> {
+    let mut union = Union::new();
+    for (sensor, sample) in sensors.iter().zip(samples) {
+        if let Some(model) = &sensor.detection {
+            let Probability { value, slope, bend } = detector::false_alarm(model, sample.square);
+            union.include(&offset(sample, variables).square(sample.square).chain(value, slope, bend));
+        }
+    }
+    union.into_jet()
+}

@@ -1,0 +1,212 @@
+//! The global start: lattice paths, made feasible; the most promising are polished for a few iterations, and the best
+//! of them is left to be polished to the end.
+//!
+//! Limits: [`CANDIDATES`] are polished, for [`POLISH_ITERATIONS`] each. A team is searched agent by agent, each with
+//! the others frozen, in every order where it is small and its agents affect each other.
+
+use heapless::Vec;
+
+use crate::math::Real;
+use crate::objective::{self, Extreme};
+use crate::scenario::View;
+use crate::warm_start::{self, Obstruction, Variant};
+
+use super::coordinates::{Frame, Iterate};
+use super::feasible::largest_share;
+use super::projection::Request;
+use super::{Ledger, Settings, Status, Workspace, improve, projected_gradient};
+
+/// Projected-gradient iterations of one candidate.
+const POLISH_ITERATIONS: usize = 12;
+/// Refinement steps of one candidate.
+const POLISH_REFINEMENTS: usize = 10;
+/// Candidates that are polished, of all that are laid.
+const CANDIDATES: usize = 4;
+/// Steps of the projection that makes a candidate feasible, and how exact it is.
+const PROJECTION_STEPS: usize = 300;
+const PROJECTION_TOLERANCE: f64 = 1e-3;
+/// Largest team for which every order is tried.
+const ORDERED_MAX: usize = 3;
+
+/// Improves the feasible `workspace.best`, whose path may be any, by the best of all candidates.
+///
+/// Returns [`Status::Infeasible`] where no candidate comes clear of regions and limits.
+pub(super) fn search<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Status
+where
+    T: Real,
+{
+    workspace.base.clone_from(&workspace.best);
+    let mut found = Found { status: Status::Infeasible, least: T::INFINITY };
+    let mut candidates = Candidates::<T>::new();
+    for order in 0..orders(scenario) {
+        for variant in warm_start::variants(scenario) {
+            if deadline() {
+                break;
+            }
+            // What closes one variant's way may leave another's open, and the straight line competes in any case.
+            if lay(scenario, &variant, order, workspace).is_ok()
+                && let Some(objective) = project(scenario, settings, workspace, ledger)
+            {
+                enter(&mut candidates, (objective, order, variant));
+            }
+        }
+    }
+    workspace.best.clone_from(&workspace.base);
+    compete(scenario, settings, workspace, (&mut found, ledger), deadline);
+    for (_, order, variant) in candidates {
+        let is_laid = !deadline() && lay(scenario, &variant, order, workspace).is_ok();
+        if is_laid && project(scenario, settings, workspace, ledger).is_some() {
+            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+            compete(scenario, settings, workspace, (&mut found, ledger), deadline);
+        }
+    }
+    workspace.best.clone_from(&workspace.champion);
+    if found.status == Status::Infeasible {
+        return found.status;
+    }
+    improve(scenario, settings, workspace, ledger, deadline)
+}
+
+/// The best candidate so far.
+struct Found<T> {
+    status: Status,
+    least: T,
+}
+
+/// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
+fn compete<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    (found, ledger): (&mut Found<T>, &mut Ledger<T>),
+    deadline: &mut dyn FnMut() -> bool,
+) where
+    T: Real,
+{
+    let short = Settings {
+        iterations: settings.iterations.min(POLISH_ITERATIONS),
+        refinements: settings.refinements.min(POLISH_REFINEMENTS),
+        ..*settings
+    };
+    let status = improve(scenario, &short, workspace, ledger, deadline);
+    let is_first = found.least == T::INFINITY;
+    if status != Status::Infeasible && (ledger.best < found.least || is_first) {
+        *found = Found { status, least: ledger.best };
+        workspace.champion.clone_from(&workspace.best);
+    } else if is_first && found.status == Status::Infeasible {
+        workspace.champion.clone_from(&workspace.best);
+    }
+}
+
+/// The most promising candidates, best first: objective as projected, order of the agents, and variant.
+type Candidates<T> = Vec<(T, usize, Variant<T>), CANDIDATES>;
+
+/// Keeps a candidate if it is among the best.
+fn enter<T: Real>(candidates: &mut Candidates<T>, candidate: (T, usize, Variant<T>)) {
+    let place = candidates.iter().take_while(|other| other.0 <= candidate.0).count();
+    if place < CANDIDATES {
+        if candidates.is_full() {
+            candidates.pop();
+        }
+        // There is room now.
+        let _ = candidates.insert(place, candidate);
+    }
+}
+
+/// Orders of the agents to try.
+fn orders<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> usize {
+    let agents = scenario.agents.len();
+    let has_jammers = scenario.agents.iter().any(|agent| agent.jammer.is_some());
+    if has_jammers && agents <= ORDERED_MAX { (1..=agents).product() } else { 1 }
+}
+
+/// Lattice paths of all agents, one after the other, into `workspace.trial`.
+fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    variant: &Variant<T>,
+    order: usize,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> Result<(), Obstruction<T, DIM>> {
+    let Workspace { base, trial, lattice, scratch, .. } = workspace;
+    trial.clone_from(base);
+    let agents = scenario.agents.len();
+    for place in 0..agents {
+        warm_start::search(scenario, trial, at_place(order, place, agents), variant, lattice, scratch)?;
+    }
+    Ok(())
+}
+
+/// The agent at a place of an order, orders counted as digits of falling base.
+fn at_place(order: usize, place: usize, agents: usize) -> usize {
+    let mut rest = order;
+    let mut used = 0_u32;
+    let mut chosen = place;
+    for step in 0..=place {
+        let open = agents.saturating_sub(step).max(1);
+        let wanted = rest % open;
+        rest /= open;
+        let free = (0..agents).filter(|&agent| used & (1 << (agent % 32)) == 0);
+        chosen = free.clone().nth(wanted).unwrap_or(step);
+        used |= 1 << (chosen % 32);
+    }
+    chosen
+}
+
+/// Makes `workspace.trial` feasible by projection, with `workspace.base` as what is known to be feasible; its
+/// objective, or `None` where it is not feasible after all.
+fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+) -> Option<T> {
+    let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.trial.duration());
+    let domain = &scenario.frame.domain;
+    frame.collapse(&workspace.base, &mut workspace.anchor);
+    frame.collapse(&workspace.trial, &mut workspace.iterate);
+    projected_gradient::lay_anchor(scenario, &frame, &mut workspace.anchor);
+    let mut none = Iterate::zeros();
+    none.pace = T::zero();
+    workspace.projection.prepare(&frame);
+    let request = Request {
+        frame: &frame,
+        domain,
+        step: T::one(),
+        margin: settings.margin.max(T::real(PROJECTION_TOLERANCE)),
+        tolerance: T::real(PROJECTION_TOLERANCE),
+        steps_max: PROJECTION_STEPS,
+    };
+    let Workspace { iterate, candidate, next, anchor, projection, .. } = workspace;
+    ledger.projection_steps += projection.project(&request, iterate, &none, candidate);
+    projected_gradient::clamp_to_domain(&frame, domain, candidate);
+    let share = largest_share(&frame, domain, anchor, candidate, anchor.pace);
+    next.between(anchor, candidate, share, &frame);
+    frame.expand(next, &mut workspace.trial);
+    ledger.evaluations += 1;
+    let objective = objective::value(scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
+    objective.finite().then_some(objective)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_all_orders() {
+        let mut seen = std::collections::BTreeSet::new();
+        for order in 0..6 {
+            let agents = [0, 1, 2].map(|place| at_place(order, place, 3));
+            let mut sorted = agents;
+            sorted.sort_unstable();
+            assert_eq!(sorted, [0, 1, 2]);
+            seen.insert(agents);
+        }
+        assert_eq!(seen.len(), 6);
+    }
+}

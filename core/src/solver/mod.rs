@@ -1,0 +1,211 @@
+//! Finds the plan: a bounded-iteration projected gradient over paths and flight time.
+//!
+//! [`plan`] starts from straight lines at constant speed, or from the trajectory that a caller gives, and improves
+//! it inside the feasible set. It is *anytime*: the incumbent in the [`Workspace`] is feasible from the first
+//! moment, never gets worse, and is what a deadline or an iteration limit returns, with a [`Status`] that says
+//! which.
+//!
+//! | symbol | name | unit | shape |
+//! |---|---|---|---|
+//! | e_i | `offset` | v_max h | N + 1 points an agent |
+//! | r | `pace` | | 1 |
+//! | alpha | `step` | | 1 |
+//!
+//! How it works, file by file:
+//! - `coordinates`: the iterate. Paths are measured from the straight line in units of the distance flown in one
+//!   interval at full speed; then the speed bound is a ball of radius 1 that does not depend on the flight time,
+//!   flight time enters through one number, and both together form a convex set.
+//! - `projection`: the nearest feasible iterate in the velocity (H1) metric, by the alternating direction method
+//!   of multipliers around one banded factor.
+//! - `feasible`: exact feasibility: the largest part of a step that keeps every bound.
+//! - `projected_gradient`: spectral steps, a non-monotone line search, and smoothing of worst-case terms.
+//! - `guard`: regions, separations and limits, which are not convex, as barriers and penalties.
+//! - `refine`: a primal-dual interior point method with banded systems, from where the gradient leaves off.
+//! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
+//!
+//! Limits: one basin from [`Start::Straight`] or [`Start::Given`]; the best of a few from [`Start::Global`].
+
+mod banded;
+mod controls;
+mod coordinates;
+mod feasible;
+mod global;
+mod guard;
+mod projected_gradient;
+mod projection;
+mod refine;
+mod settings;
+mod start;
+mod workspace;
+
+pub use settings::Settings;
+pub use start::Start;
+pub use workspace::Workspace;
+
+use crate::error::{Error, Fault, Item};
+use crate::math::Real;
+use crate::objective::{self, Extreme};
+use crate::scenario::View;
+
+/// Why the planner stopped. Every status but [`Status::Infeasible`] comes with a feasible plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Status {
+    /// The projected gradient vanished to the tolerance asked for.
+    Converged,
+    /// The iteration limit was reached first.
+    IterationLimit,
+    /// The caller's deadline came first.
+    Deadline,
+    /// No feasible plan was found to start from.
+    Infeasible,
+    /// No step along the projected gradient improves the plan any more, and the gradient has not vanished.
+    Stalled,
+    /// The objective or its gradient is not a finite number at the plan.
+    NonFinite,
+}
+
+impl Status {
+    /// The word that plan files use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::IterationLimit => "iteration_limit",
+            Self::Deadline => "deadline",
+            Self::Infeasible => "infeasible",
+            Self::Stalled => "stalled",
+            Self::NonFinite => "non_finite",
+        }
+    }
+}
+
+/// What a call of [`plan`] did; the plan itself is [`Workspace::best`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome<T> {
+    /// Why it stopped.
+    pub status: Status,
+    /// Objective of the plan, worst-case terms exact.
+    pub objective: T,
+    /// Projected-gradient iterations done.
+    pub iterations: usize,
+    /// Steps of the second-order refinement.
+    pub refinements: usize,
+    /// Banded systems factored, those that were not positive definite included.
+    pub factorizations: usize,
+    /// Evaluations of the objective, with or without gradient.
+    pub evaluations: usize,
+    /// Steps of the projection, over all iterations.
+    pub projection_steps: usize,
+}
+
+/// Plans `scenario` from `start` into `workspace`.
+///
+/// `deadline` is asked once per iteration and ends the planning when it answers `true`; pass `&mut || false` for
+/// none.
+///
+/// # Errors
+/// Where the scenario does not fit the workspace, asks for something this version does not plan, or has a start
+/// velocity that no feasible path can follow. The workspace then holds no plan.
+pub fn plan<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    start: Start<'_, T, DIM, NODES, AGENTS>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Result<Outcome<T>, Error>
+where
+    T: Real,
+{
+    supported(scenario, SENSORS)?;
+    workspace.best.resize(scenario.frame.intervals, scenario.agents.len())?;
+    start::lay(scenario, settings, start, workspace)?;
+    if start::is_straight_only(scenario) {
+        let objective = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
+        let status = if objective.finite() { Status::Converged } else { Status::NonFinite };
+        return Ok(Outcome {
+            status,
+            objective,
+            iterations: 0,
+            refinements: 0,
+            factorizations: 0,
+            evaluations: 1,
+            projection_steps: 0,
+        });
+    }
+    let first = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
+    let mut ledger = Ledger {
+        best: first,
+        iterations: 0,
+        refinements: 0,
+        factorizations: 0,
+        evaluations: 1,
+        projection_steps: 0,
+        keeps: Keeps::Better,
+    };
+    let status = if !first.finite() {
+        Status::NonFinite
+    } else if matches!(start, Start::Global) {
+        global::search(scenario, settings, workspace, &mut ledger, deadline)
+    } else {
+        improve(scenario, settings, workspace, &mut ledger, deadline)
+    };
+    Ok(Outcome {
+        status,
+        objective: ledger.best,
+        iterations: ledger.iterations,
+        refinements: ledger.refinements,
+        factorizations: ledger.factorizations,
+        evaluations: ledger.evaluations,
+        projection_steps: ledger.projection_steps,
+    })
+}
+
+/// Improves `workspace.best` inside its basin: projected gradient, then refinement. `ledger.best` becomes its
+/// objective.
+fn improve<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Status
+where
+    T: Real,
+{
+    let status = projected_gradient::descend(scenario, settings, workspace, ledger, deadline);
+    let may_refine = !matches!(status, Status::Deadline | Status::Infeasible | Status::NonFinite);
+    if may_refine && settings.refinements > 0 {
+        return refine::polish(scenario, settings, workspace, ledger, deadline).unwrap_or(status);
+    }
+    status
+}
+
+/// The counts and the incumbent of one plan.
+struct Ledger<T> {
+    best: T,
+    iterations: usize,
+    refinements: usize,
+    factorizations: usize,
+    evaluations: usize,
+    projection_steps: usize,
+    keeps: Keeps,
+}
+
+/// What makes a trial the incumbent.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Keeps {
+    /// A better objective.
+    Better,
+    /// Smaller violations.
+    Clearer,
+}
+
+/// Refuses what does not fit.
+fn supported<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, sensors_max: usize) -> Result<(), Error> {
+    if scenario.sensors.len() > sensors_max {
+        let fault = Fault::TooMany { count: scenario.sensors.len(), capacity: sensors_max };
+        return Err(Error::new(Item::Scenario, "sensor", fault));
+    }
+    Ok(())
+}

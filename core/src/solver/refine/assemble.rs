@@ -1,0 +1,570 @@
+//! Fills an agent's Newton system: second derivatives of objective and barriers, and minus the first ones.
+//!
+//! With kappa = v h / r the position is x_i = line + kappa e_i and the node time t_i = t_0 + i h / r, so that along the
+//! pace dx_i = -kappa e_i / r and dt_i = -(t_i - t_0) / r, each with second derivative -2 / r times itself.
+//! Second derivatives of the metrics come from [`crate::objective::curvature`]; bounds add
+//! lambda (grad g grad g' / g - g''), the primal-dual form of a logarithmic barrier.
+
+use heapless::Vec;
+
+use crate::jet::Jet;
+use crate::math::{Point, Real, norm_squared};
+use crate::metrics::{Needs, Sample, Values, Variables};
+use crate::objective::curvature::{Integrals, Slope, Slopes, Weigh, node_curvature};
+use crate::objective::merit::slacks;
+use crate::scenario::{Domain, Metric, ReferencePoint, View};
+use crate::solver::controls::{Bound, KINDS, Kind};
+use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
+use crate::trajectory::Trajectory;
+
+use super::barrier::{Multipliers, for_each_wall};
+use super::extremes::Extremes;
+use super::rows::{Ball, for_each_ball, index};
+use super::system::{BUDGETS, EXTREMES, PACE, System};
+
+/// Most variables that a node has: position, the one before, three controls and time, in three dimensions.
+const VARIABLES_MAX: usize = 10;
+
+/// What a variable of a node is to the system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    Here(usize),
+    Before(usize),
+    Control(usize),
+    Time,
+}
+
+/// What one agent's assembly reads.
+pub(super) struct Source<'a, T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+    /// The problem with its integral terms only.
+    pub(super) plain: &'a View<'a, T, DIM>,
+    pub(super) frame: &'a Frame<T, DIM, AGENTS>,
+    pub(super) iterate: &'a Iterate<T, DIM, NODES, AGENTS>,
+    /// `iterate`, written out.
+    pub(super) trajectory: &'a Trajectory<T, DIM, NODES, AGENTS>,
+    /// Of integral terms, penalty and guards.
+    pub(super) gradient: &'a Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) extremes: &'a Extremes<T>,
+    /// mu.
+    pub(super) barrier: T,
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<'_, T, DIM, NODES, AGENTS> {
+    /// Fills `system` for `agent`.
+    pub(super) fn fill(
+        &self,
+        index: usize,
+        agent: &AgentFrame<T, DIM>,
+        multipliers: &mut Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+        scratch: &mut [Sample<T, DIM>],
+    ) {
+        let Some(offsets) = self.iterate.interior(self.frame).nth(index) else { return };
+        self.first_derivatives(index, system);
+        self.balls(agent, offsets, multipliers, system);
+        let domain = &self.plain.frame.domain;
+        self.walls(domain, agent, offsets, multipliers, system);
+        self.levels(index, agent, multipliers, system);
+        for node in 1..=self.frame.intervals {
+            self.node(index, agent, node, multipliers, system, scratch);
+        }
+    }
+
+    /// Minus the gradient of what [`Source::gradient`] covers; the pace's is not an agent's own.
+    fn first_derivatives(&self, index: usize, system: &mut System<T, DIM, NODES>) {
+        if let Some(slopes) = self.gradient.interior(self.frame).nth(index) {
+            for (right, slope) in system.right.path.iter_mut().zip(slopes) {
+                *right = -slope;
+            }
+        }
+        for kind in Kind::ALL {
+            let slopes = self.gradient.levels((index, kind), self.frame.intervals);
+            for (right, &slope) in system.right.control.iter_mut().zip(slopes) {
+                right[kind as usize] = -slope;
+            }
+        }
+    }
+
+    fn balls(
+        &self,
+        agent: &AgentFrame<T, DIM>,
+        offsets: &[Point<T, DIM>],
+        multipliers: &mut Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let intervals = self.frame.intervals;
+        for_each_ball(self.frame, agent, offsets, self.iterate.pace, |place, ball| {
+            let multiplier = multipliers.of_ball(place, intervals).copied().unwrap_or_default();
+            add_ball(ball, multiplier, self.barrier, system);
+        });
+    }
+
+    fn walls(
+        &self,
+        domain: &Domain<T, DIM>,
+        agent: &AgentFrame<T, DIM>,
+        offsets: &[Point<T, DIM>],
+        multipliers: &Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        for_each_wall(self.frame, domain, agent, (offsets, self.iterate.pace), |wall| {
+            let multiplier = multipliers
+                .place
+                .get(wall.side)
+                .and_then(|side| side.get(wall.node))
+                .map_or(T::zero(), |point| point.get(wall.component).copied().unwrap_or_default());
+            let stiffness = multiplier / wall.slack;
+            let push = self.barrier / wall.slack;
+            let (by_offset, by_pace) = (wall.by_offset, wall.by_pace);
+            let Some(row) = system.rows.get_mut(wall.node) else { return };
+            row.here[(wall.component, wall.component)] += stiffness;
+            system.columns[PACE].path[wall.node][wall.component] += stiffness * by_offset * by_pace;
+            system.border[PACE][PACE] += stiffness * by_pace * by_pace;
+            system.right.path[wall.node][wall.component] += push * by_offset;
+            system.border_right[PACE] += push * by_pace;
+        });
+    }
+
+    fn levels(
+        &self,
+        index: usize,
+        agent: &AgentFrame<T, DIM>,
+        multipliers: &Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let (one, barrier) = (T::one(), self.barrier);
+        for (kind, bound) in Kind::ALL.into_iter().zip(agent.controls) {
+            let Bound::Level { allowance } = bound else { continue };
+            let column = BUDGETS + usize::from(kind == Kind::Dropout);
+            let kind_index = kind as usize;
+            let levels = self.iterate.levels((index, kind), self.frame.intervals);
+            let used = levels.iter().fold(T::zero(), |sum, &level| sum + level);
+            let rest = allowance * self.iterate.pace - used;
+            let [low, high] = &multipliers.level;
+            let sides = low[kind_index].iter().zip(&high[kind_index]);
+            let nodes =
+                system.local.iter_mut().zip(&mut system.right.control).zip(&mut system.columns[column].control);
+            for ((((local, right), border), &level), (&low, &high)) in nodes.zip(levels).zip(sides) {
+                local.matrix[kind_index][kind_index] += low / level + high / (one - level);
+                right[kind_index] += barrier / level - barrier / (one - level) - barrier / rest;
+                border[kind_index] = -one;
+            }
+            system.border[column][PACE] = allowance;
+            system.border[PACE][column] = allowance;
+            system.border[column][column] = -rest / multipliers.budget[kind_index];
+            system.border_right[PACE] += barrier * allowance / rest;
+        }
+    }
+
+    /// Objective, limits and worst values at a node.
+    fn node(
+        &self,
+        agent_index: usize,
+        agent: &AgentFrame<T, DIM>,
+        node: usize,
+        multipliers: &Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+        scratch: &mut [Sample<T, DIM>],
+    ) {
+        let (variables, roles) = self.variables(agent);
+        let at = At { agent_index, agent, node, variables, roles: &roles };
+        match roles.len() {
+            0..=2 => self.node_of::<2>(&at, multipliers, system, scratch),
+            3 => self.node_of::<3>(&at, multipliers, system, scratch),
+            4 => self.node_of::<4>(&at, multipliers, system, scratch),
+            5 | 6 => self.node_of::<6>(&at, multipliers, system, scratch),
+            _ => self.node_of::<VARIABLES_MAX>(&at, multipliers, system, scratch),
+        }
+    }
+
+    fn node_of<const M: usize>(
+        &self,
+        at: &At<'_, T, DIM>,
+        multipliers: &Multipliers<T, DIM, NODES>,
+        system: &mut System<T, DIM, NODES>,
+        scratch: &mut [Sample<T, DIM>],
+    ) {
+        let (scenario, trajectory) = (self.plain, self.trajectory);
+        let time = trajectory.times.get(at.node).copied().unwrap_or_default();
+        let place = Place::new(self, at, time);
+        let (agent, node) = (at.agent_index, at.node);
+        let integrals = Integrals { scenario, time };
+        let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &integrals, scratch);
+        place.add(&jet, self.frame.interval / self.iterate.pace, Share::Integral, system);
+        if !scenario.limits.is_empty() {
+            let limits = Limits { scenario, barrier: self.barrier };
+            let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &limits, scratch);
+            place.add(&jet, T::one(), Share::Node, system);
+        }
+        for worst in self.extremes.of(agent).filter(|worst| worst.term.window.holds(time)) {
+            let own = Own { agent, metric: worst.term.metric };
+            let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &own, scratch);
+            let sign = worst.sign();
+            let slack = worst.value - sign * jet.value;
+            let slot = worst.slot;
+            let multiplier =
+                multipliers.extreme.get(slot).and_then(|nodes| nodes.get(node - 1)).copied().unwrap_or_default();
+            place.add_worst(&jet, sign, (slack, multiplier, self.barrier), EXTREMES + slot, system);
+        }
+    }
+
+    /// Which variables the nodes of an agent have, and what each is to the system.
+    fn variables(&self, agent: &AgentFrame<T, DIM>) -> (Variables, Vec<Role, VARIABLES_MAX>) {
+        let mut roles = Vec::<Role, VARIABLES_MAX>::new();
+        let mut variables = Variables { position: Some(0), ..Variables::default() };
+        let mut push = |role| {
+            let index = roles.len();
+            roles.push(role).ok().map(|()| index)
+        };
+        for component in 0..DIM {
+            let _ = push(Role::Here(component));
+        }
+        if self.plain.frame.reference_point == ReferencePoint::Lagged {
+            variables.reference = push(Role::Before(0));
+            for component in 1..DIM {
+                let _ = push(Role::Before(component));
+            }
+        }
+        let [jam, azimuth, dropout] = agent.controls.map(|bound| bound != Bound::Off);
+        if jam {
+            variables.level = push(Role::Control(Kind::Jam as usize));
+        }
+        if azimuth {
+            variables.azimuth = push(Role::Control(Kind::Azimuth as usize));
+        }
+        if dropout {
+            variables.dropout = push(Role::Control(Kind::Dropout as usize));
+        }
+        if self.plain.sensors.iter().any(|sensor| sensor.is_moving()) {
+            variables.time = push(Role::Time);
+        }
+        (variables, roles)
+    }
+}
+
+/// Adds a bound on speed or acceleration.
+fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
+    ball: &Ball<T, DIM>,
+    multiplier: T,
+    barrier: T,
+    system: &mut System<T, DIM, NODES>,
+) {
+    let (two, four) = (T::real(2.0), T::real(4.0));
+    let interior = system.intervals.saturating_sub(1);
+    let slack = ball.slack();
+    let mut bend = ball.value * ball.value.transpose() * (four * multiplier / slack);
+    for k in 0..DIM {
+        bend[(k, k)] += two * multiplier;
+    }
+    let by_radius = ball.value * (-four * multiplier * ball.radius * ball.radius_by_pace / slack);
+    let along_pace = bend * ball.by_pace + by_radius;
+    let radial = two * multiplier * ball.radius_by_pace * ball.radius_by_pace;
+    let push = two * barrier / slack;
+    system.border[PACE][PACE] += ball.by_pace.dot(&(along_pace + by_radius))
+        + radial * (ball.radius * ball.radius + norm_squared(&ball.value)) / slack;
+    system.border_right[PACE] += push * ball.half_slack_by_pace();
+    for (a, &weight_a) in ball.weights.iter().enumerate() {
+        let Some(row) = index(ball.first, a).filter(|&row| row < interior && weight_a != T::zero()) else { continue };
+        system.columns[PACE].path[row] += along_pace * weight_a;
+        system.right.path[row] -= ball.value * (push * weight_a);
+        for (b, &weight_b) in ball.weights.iter().enumerate().take(a + 1) {
+            if index(ball.first, b).is_none() {
+                continue;
+            }
+            let entry = match (a - b, &mut system.rows[row]) {
+                (0, row) => &mut row.here,
+                (1, row) => &mut row.one,
+                (_, row) => &mut row.two,
+            };
+            *entry += bend * (weight_a * weight_b);
+        }
+    }
+}
+
+/// A node of an agent.
+struct At<'a, T, const DIM: usize> {
+    agent_index: usize,
+    agent: &'a AgentFrame<T, DIM>,
+    node: usize,
+    variables: Variables,
+    roles: &'a [Role],
+}
+
+/// What the value of a node enters the objective by.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Share {
+    /// Times the interval, which depends on the pace.
+    Integral,
+    /// As it is.
+    Node,
+}
+
+/// A node's place in the system, and how its variables move with the pace.
+struct Place<'a, T> {
+    roles: &'a [Role],
+    /// node - 1.
+    index: usize,
+    interior: usize,
+    /// kappa.
+    scale: T,
+    pace: T,
+    /// Change of each variable with the pace.
+    along: [T; VARIABLES_MAX],
+}
+
+impl<'a, T: Real> Place<'a, T> {
+    fn new<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        source: &Source<'_, T, DIM, NODES, AGENTS>,
+        at: &At<'a, T, DIM>,
+        time: T,
+    ) -> Self {
+        let pace = source.iterate.pace;
+        let scale = at.agent.stride / pace;
+        let offsets = source.iterate.offset.get(at.agent_index).map(|nodes| nodes.as_slice()).unwrap_or_default();
+        let offset = |node: usize, component: usize| {
+            offsets.get(node).and_then(|offset| offset.get(component)).copied().unwrap_or_default()
+        };
+        let mut along = [T::zero(); VARIABLES_MAX];
+        for (along, role) in along.iter_mut().zip(at.roles) {
+            *along = match *role {
+                Role::Here(component) => -offset(at.node, component) * scale / pace,
+                Role::Before(component) => -offset(at.node - 1, component) * scale / pace,
+                Role::Control(_) => T::zero(),
+                Role::Time => -(time - source.frame.start_time) / pace,
+            };
+        }
+        let interior = source.frame.intervals.saturating_sub(1);
+        Self { roles: at.roles, index: at.node - 1, interior, scale, pace, along }
+    }
+
+    /// Factor between a variable and its unknown.
+    fn factor(&self, role: Role) -> T {
+        match role {
+            Role::Here(_) | Role::Before(_) => self.scale,
+            Role::Control(_) => T::one(),
+            Role::Time => T::zero(),
+        }
+    }
+
+    /// Adds `weight` times a jet's second derivatives.
+    fn add<const DIM: usize, const NODES: usize, const M: usize>(
+        &self,
+        jet: &Jet<T, M>,
+        weight: T,
+        share: Share,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let two = T::real(2.0);
+        let mut slope = T::zero();
+        let mut bend = T::zero();
+        for (a, &role) in self.roles.iter().enumerate().take(M) {
+            let mut along = T::zero();
+            for (b, &change) in self.along.iter().enumerate().take(M) {
+                along += jet.hessian[a][b] * change;
+            }
+            slope += jet.gradient[a] * self.along[a];
+            bend += along * self.along[a];
+            // What scales with the pace itself: kappa, and the interval where there is one.
+            let scaled = match (role, share) {
+                (Role::Here(_) | Role::Before(_), Share::Integral) => -two,
+                (Role::Here(_) | Role::Before(_), Share::Node) | (Role::Control(_), Share::Integral) => -T::one(),
+                _ => T::zero(),
+            };
+            let factor = self.factor(role) * weight;
+            self.add_to_column(role, PACE, factor * (along + scaled * jet.gradient[a] / self.pace), system);
+            for (b, &other) in self.roles.iter().enumerate().take(M) {
+                self.add_pair(role, other, factor * self.factor(other) * jet.hessian[a][b], system);
+            }
+        }
+        let own = match share {
+            Share::Integral => -T::real(4.0) * slope / self.pace + two * jet.value / (self.pace * self.pace),
+            Share::Node => -two * slope / self.pace,
+        };
+        system.border[PACE][PACE] += weight * (bend + own);
+    }
+
+    /// Adds the barrier of one node of a worst value epsilon: slack epsilon - sign E.
+    fn add_worst<const DIM: usize, const NODES: usize, const M: usize>(
+        &self,
+        jet: &Jet<T, M>,
+        sign: T,
+        (slack, multiplier, barrier): (T, T, T),
+        column: usize,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let (stiffness, push) = (multiplier / slack, barrier / slack);
+        let mut outer = *jet;
+        for a in 0..M {
+            for b in 0..M {
+                outer.hessian[a][b] =
+                    multiplier * sign * jet.hessian[a][b] + stiffness * jet.gradient[a] * jet.gradient[b];
+            }
+            outer.gradient[a] = multiplier * sign * jet.gradient[a];
+        }
+        self.add(&outer, T::one(), Share::Node, system);
+        let mut along = T::zero();
+        for (a, &role) in self.roles.iter().enumerate().take(M) {
+            along += jet.gradient[a] * self.along[a];
+            self.add_to_column(role, column, -stiffness * sign * jet.gradient[a] * self.factor(role), system);
+            // The gradient of -mu ln(epsilon - sign E).
+            self.add_to_right(role, -push * sign * jet.gradient[a] * self.factor(role), system);
+        }
+        system.border[column][column] += stiffness;
+        system.border[column][PACE] -= stiffness * sign * along;
+        system.border[PACE][column] -= stiffness * sign * along;
+        system.border_right[column] += push;
+        system.border_right[PACE] -= push * sign * along;
+    }
+
+    fn add_pair<const DIM: usize, const NODES: usize>(
+        &self,
+        role: Role,
+        other: Role,
+        value: T,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let here = self.index < self.interior;
+        let before = self.index.checked_sub(1);
+        match (role, other) {
+            (Role::Here(a), Role::Here(b)) if here => system.rows[self.index].here[(a, b)] += value,
+            (Role::Here(a), Role::Before(b)) if here && before.is_some() => {
+                system.rows[self.index].one[(a, b)] += value;
+            }
+            (Role::Before(a), Role::Before(b)) => {
+                if let Some(before) = before {
+                    system.rows[before].here[(a, b)] += value;
+                }
+            }
+            (Role::Control(a), Role::Control(b)) => system.local[self.index].matrix[a][b] += value,
+            (Role::Control(a), Role::Here(b)) if here => system.local[self.index].here[a][b] += value,
+            (Role::Control(a), Role::Before(b)) if before.is_some() => system.local[self.index].before[a][b] += value,
+            _ => {}
+        }
+    }
+
+    fn add_to_column<const DIM: usize, const NODES: usize>(
+        &self,
+        role: Role,
+        column: usize,
+        value: T,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        add_to_part(self, role, value, &mut system.columns[column]);
+    }
+
+    fn add_to_right<const DIM: usize, const NODES: usize>(
+        &self,
+        role: Role,
+        value: T,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        add_to_part(self, role, value, &mut system.right);
+    }
+}
+
+fn add_to_part<T: Real, const DIM: usize, const NODES: usize>(
+    place: &Place<'_, T>,
+    role: Role,
+    value: T,
+    part: &mut super::system::Part<T, DIM, NODES>,
+) {
+    match role {
+        Role::Here(component) if place.index < place.interior => part.path[place.index][component] += value,
+        Role::Before(component) => {
+            if let Some(before) = place.index.checked_sub(1) {
+                part.path[before][component] += value;
+            }
+        }
+        Role::Control(kind) => part.control[place.index][kind] += value,
+        _ => {}
+    }
+}
+
+/// Barriers of the limits: psi = -mu ln g.
+struct Limits<'a, T, const DIM: usize> {
+    scenario: &'a View<'a, T, DIM>,
+    barrier: T,
+}
+
+impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
+    fn needs(&self, _: usize) -> Needs {
+        let mut needs = Needs::default();
+        self.scenario.limits.iter().for_each(|limit| needs.add(limit.metric));
+        needs
+    }
+
+    fn slopes(&self, _: usize, values: &Values<T>) -> Slopes<T> {
+        let mut slopes = Slopes::new();
+        for limit in self.scenario.limits {
+            let Some(value) = values.get(limit.metric) else { continue };
+            let (mut first, mut second) = (T::zero(), T::zero());
+            for (slack, by_value) in slacks(limit, value).into_iter().flatten() {
+                let push = self.barrier / slack;
+                first -= push * by_value;
+                second += push / slack * by_value * by_value;
+            }
+            let _ = slopes.push(Slope { metric: limit.metric, first, second });
+        }
+        slopes
+    }
+}
+
+/// One agent's own metric, as it is.
+struct Own {
+    agent: usize,
+    metric: Metric,
+}
+
+impl<T: Real> Weigh<T> for Own {
+    fn needs(&self, agent: usize) -> Needs {
+        let mut needs = Needs::default();
+        if agent == self.agent {
+            needs.add(self.metric);
+        }
+        needs
+    }
+
+    fn slopes(&self, agent: usize, _: &Values<T>) -> Slopes<T> {
+        let mut slopes = Slopes::new();
+        if agent == self.agent {
+            let _ = slopes.push(Slope { metric: self.metric, first: T::one(), second: T::zero() });
+        }
+        slopes
+    }
+}
+
+/// Adds the barrier of a region or separation to the agent that flies the segment: its first-order part squared.
+///
+/// `by_ends` are the derivatives by the positions at both ends of the segment that ends at `node`.
+pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
+    system: &mut System<T, DIM, NODES>,
+    (offsets, scale, pace): (&[Point<T, DIM>; NODES], T, T),
+    node: usize,
+    stiffness: T,
+    by_ends: &[Point<T, DIM>; 2],
+) {
+    let interior = system.intervals.saturating_sub(1);
+    let [by_from, by_to] = by_ends;
+    let zero = Point::<T, DIM>::zeros();
+    let moved = |node: usize| offsets.get(node).copied().unwrap_or(zero) * (-scale / pace);
+    let from = node.checked_sub(2);
+    let to = Some(node - 1).filter(|&to| to < interior);
+    let before = if node >= 1 { moved(node - 1) } else { zero };
+    let by_pace = by_from.dot(&before) + by_to.dot(&moved(node));
+    let (a, b) = (by_from * scale, by_to * scale);
+    if let Some(from) = from {
+        system.rows[from].here += a * a.transpose() * stiffness;
+        system.columns[PACE].path[from] += a * (stiffness * by_pace);
+    }
+    if let Some(to) = to {
+        system.rows[to].here += b * b.transpose() * stiffness;
+        system.columns[PACE].path[to] += b * (stiffness * by_pace);
+        if from.is_some() {
+            system.rows[to].one += b * a.transpose() * stiffness;
+        }
+    }
+    system.border[PACE][PACE] += stiffness * by_pace * by_pace;
+}
+
+/// Kinds of controls, for the sizes of this module.
+const _: () = assert!(KINDS == 3, "a budget column each for jamming and dropout");

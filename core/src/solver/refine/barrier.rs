@@ -1,0 +1,163 @@
+//! Slacks of everything that is kept by its own barrier here, their multipliers, and how far a step may go.
+//!
+//! | symbol | name | shape |
+//! |---|---|---|
+//! | g | slack: speed, acceleration, box, levels, budgets, pace | many |
+//! | lambda | multiplier, close to mu / g | as g |
+//!
+//! Regions, separations and limits have their barrier in [`crate::solver::guard`].
+
+use crate::math::{Point, Real};
+use crate::scenario::Domain;
+use crate::solver::controls::{Bound, KINDS};
+use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
+
+use super::rows::for_each_ball;
+use super::system::EXTREMES_MAX;
+
+/// The multipliers of one agent.
+#[derive(Clone, Debug)]
+pub(super) struct Multipliers<T, const DIM: usize, const NODES: usize> {
+    /// Steps, then bends, by interval.
+    pub(super) ball: [[T; NODES]; 2],
+    /// Lower and upper bounds of positions, by interior index.
+    pub(super) place: [[Point<T, DIM>; NODES]; 2],
+    /// Lower and upper bounds of levels, by kind and node - 1.
+    pub(super) level: [[[T; NODES]; KINDS]; 2],
+    pub(super) budget: [T; KINDS],
+    /// Worst values, by slot and node - 1.
+    pub(super) extreme: [[T; NODES]; EXTREMES_MAX],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize> Multipliers<T, DIM, NODES> {
+    pub(super) fn zeros() -> Self {
+        let none = [T::zero(); NODES];
+        Self {
+            ball: [none; 2],
+            place: [[Point::zeros(); NODES]; 2],
+            level: [[none; KINDS]; 2],
+            budget: [T::zero(); KINDS],
+            extreme: [none; EXTREMES_MAX],
+        }
+    }
+
+    /// The multiplier of a ball by its place in the order of the visitor.
+    pub(super) fn of_ball(&mut self, place: usize, intervals: usize) -> Option<&mut T> {
+        let [steps, bends] = &mut self.ball;
+        if place < intervals { steps.get_mut(place) } else { bends.get_mut(place - intervals) }
+    }
+}
+
+/// A box side at an interior node: slack and its derivatives by the offset's component and by the pace.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wall<T> {
+    pub(super) node: usize,
+    pub(super) component: usize,
+    /// 0 for the lower side, 1 for the upper.
+    pub(super) side: usize,
+    pub(super) slack: T,
+    pub(super) by_offset: T,
+    pub(super) by_pace: T,
+}
+
+/// Visits the box sides of an agent.
+pub(super) fn for_each_wall<T: Real, const DIM: usize, const AGENTS: usize>(
+    frame: &Frame<T, DIM, AGENTS>,
+    domain: &Domain<T, DIM>,
+    agent: &AgentFrame<T, DIM>,
+    (offsets, pace): (&[Point<T, DIM>], T),
+    mut visit: impl FnMut(&Wall<T>),
+) {
+    let count = T::from_count(frame.intervals.max(1));
+    for (node, offset) in offsets.iter().enumerate() {
+        let line = agent.start + agent.line * (T::from_count(node + 1) / count);
+        let low = (domain.min - line) / agent.stride;
+        let high = (domain.max - line) / agent.stride;
+        for (component, ((&value, &low), &high)) in offset.iter().zip(low.iter()).zip(high.iter()).enumerate() {
+            let one = T::one();
+            visit(&Wall { node, component, side: 0, slack: value - low * pace, by_offset: one, by_pace: -low });
+            visit(&Wall { node, component, side: 1, slack: high * pace - value, by_offset: -one, by_pace: high });
+        }
+    }
+}
+
+/// A sum of logarithms that takes one logarithm for many numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LogSum<T> {
+    product: T,
+    sum: T,
+}
+
+impl<T: Real> LogSum<T> {
+    pub(super) fn new() -> Self {
+        Self { product: T::one(), sum: T::zero() }
+    }
+
+    /// Adds ln `number`; minus infinity for what is not positive.
+    #[inline]
+    pub(super) fn add(&mut self, number: T) {
+        if number.is_not_a_number() || number <= T::zero() {
+            self.sum = -T::INFINITY;
+            return;
+        }
+        self.product *= number;
+        if self.product < T::one() / T::LARGE.sqrt() || self.product > T::LARGE.sqrt() {
+            self.sum += self.product.ln();
+            self.product = T::one();
+        }
+    }
+
+    pub(super) fn total(&self) -> T {
+        self.sum + self.product.ln()
+    }
+}
+
+/// Sum of the logarithms of all slacks; minus infinity where one is not positive.
+pub(super) fn log_slacks<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    frame: &Frame<T, DIM, AGENTS>,
+    domain: &Domain<T, DIM>,
+    iterate: &Iterate<T, DIM, NODES, AGENTS>,
+) -> T {
+    let mut logs = LogSum::new();
+    logs.add(iterate.pace - frame.pace_min);
+    for (offsets, agent) in iterate.interior(frame).zip(frame.agent()) {
+        for_each_ball(frame, agent, offsets, iterate.pace, |_, ball| logs.add(ball.slack()));
+        for_each_wall(frame, domain, agent, (offsets, iterate.pace), |wall| logs.add(wall.slack));
+    }
+    for (slot, bound) in frame.equipment() {
+        let Bound::Level { allowance } = bound else { continue };
+        let mut rest = allowance * iterate.pace;
+        for &level in iterate.levels(slot, frame.intervals) {
+            logs.add(level);
+            logs.add(T::one() - level);
+            rest -= level;
+        }
+        logs.add(rest);
+    }
+    logs.total()
+}
+
+/// Largest share of a step of levels that keeps them, and their budgets, inside.
+pub(super) fn level_share<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    frame: &Frame<T, DIM, AGENTS>,
+    from: &Iterate<T, DIM, NODES, AGENTS>,
+    to: &Iterate<T, DIM, NODES, AGENTS>,
+) -> T {
+    let mut share = T::one();
+    let mut keep = |slack: T, slack_there: T| {
+        if slack_there < T::zero() {
+            share = share.min(slack / (slack - slack_there));
+        }
+    };
+    for (slot, bound) in frame.equipment() {
+        let Bound::Level { allowance } = bound else { continue };
+        let mut rest = (allowance * from.pace, allowance * to.pace);
+        for (&a, &b) in from.levels(slot, frame.intervals).iter().zip(to.levels(slot, frame.intervals)) {
+            keep(a, b);
+            keep(T::one() - a, T::one() - b);
+            rest = (rest.0 - a, rest.1 - b);
+        }
+        keep(rest.0, rest.1);
+    }
+    share
+}

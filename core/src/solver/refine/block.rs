@@ -1,0 +1,201 @@
+//! Symmetric positive definite systems with blocks of one node, each coupled to its two neighbours on either side.
+//!
+//! The speed bound couples neighbouring nodes, the acceleration bound those two apart: a block matrix with two
+//! diagonals on either side, factored as L L' in O(N).
+//!
+//! Limits: `NODES` bounds the number of blocks.
+
+use nalgebra::SMatrix;
+
+use crate::math::{Point, Real};
+
+/// A block: `DIM` x `DIM`.
+pub(super) type Block<T, const DIM: usize> = SMatrix<T, DIM, DIM>;
+
+/// The blocks of one row on and left of the diagonal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockRow<T, const DIM: usize> {
+    /// On the diagonal.
+    pub(super) here: Block<T, DIM>,
+    /// One to the left.
+    pub(super) one: Block<T, DIM>,
+    /// Two to the left.
+    pub(super) two: Block<T, DIM>,
+}
+
+impl<T: Real, const DIM: usize> BlockRow<T, DIM> {
+    pub(super) fn zeros() -> Self {
+        Self { here: Block::zeros(), one: Block::zeros(), two: Block::zeros() }
+    }
+}
+
+/// Lower triangle of a positive definite block; `None` if it is not. Diagonal entries are stored inverted.
+fn cholesky<T: Real, const DIM: usize>(block: &Block<T, DIM>, floor: T) -> Option<Block<T, DIM>> {
+    let mut lower = Block::<T, DIM>::zeros();
+    for column in 0..DIM {
+        let mut pivot = block[(column, column)];
+        for k in 0..column {
+            pivot -= lower[(column, k)] * lower[(column, k)];
+        }
+        if pivot.is_not_a_number() || pivot <= floor {
+            return None;
+        }
+        let inverse = T::one() / pivot.sqrt();
+        lower[(column, column)] = inverse;
+        for row in column + 1..DIM {
+            let mut sum = block[(row, column)];
+            for k in 0..column {
+                sum -= lower[(row, k)] * lower[(column, k)];
+            }
+            lower[(row, column)] = sum * inverse;
+        }
+    }
+    Some(lower)
+}
+
+/// C^-1 v for a factor with inverted diagonal.
+fn forward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, DIM>) -> Point<T, DIM> {
+    let mut result = *vector;
+    for row in 0..DIM {
+        for k in 0..row {
+            let known = result[k];
+            result[row] -= lower[(row, k)] * known;
+        }
+        result[row] *= lower[(row, row)];
+    }
+    result
+}
+
+/// C^-T v for a factor with inverted diagonal.
+fn backward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, DIM>) -> Point<T, DIM> {
+    let mut result = *vector;
+    for row in (0..DIM).rev() {
+        for k in row + 1..DIM {
+            let known = result[k];
+            result[row] -= lower[(k, row)] * known;
+        }
+        result[row] *= lower[(row, row)];
+    }
+    result
+}
+
+/// M C^-T: every row of M, forward.
+fn right_divide<T: Real, const DIM: usize>(matrix: &Block<T, DIM>, lower: &Block<T, DIM>) -> Block<T, DIM> {
+    let mut result = *matrix;
+    for row in 0..DIM {
+        for column in 0..DIM {
+            for k in 0..column {
+                let known = result[(row, k)];
+                result[(row, column)] -= known * lower[(column, k)];
+            }
+            result[(row, column)] *= lower[(column, column)];
+        }
+    }
+    result
+}
+
+/// Replaces the rows of a matrix by those of its factor; false if it is not positive definite.
+#[must_use]
+pub(super) fn factor<T: Real, const DIM: usize>(rows: &mut [BlockRow<T, DIM>], floor: T) -> bool {
+    // Rows one and two above.
+    let mut above = BlockRow::<T, DIM>::zeros();
+    let mut above_two = BlockRow::<T, DIM>::zeros();
+    for (index, row) in rows.iter_mut().enumerate() {
+        if index < 2 {
+            row.two = Block::zeros();
+        } else {
+            row.two = right_divide(&row.two, &above_two.here);
+        }
+        if index < 1 {
+            row.one = Block::zeros();
+        } else {
+            let one = row.one - row.two * above.one.transpose();
+            row.one = right_divide(&one, &above.here);
+        }
+        let here = row.here - row.two * row.two.transpose() - row.one * row.one.transpose();
+        let Some(lower) = cholesky(&here, floor) else { return false };
+        row.here = lower;
+        (above_two, above) = (above, *row);
+    }
+    true
+}
+
+/// Replaces a right-hand side by the solution, with rows that [`factor`] has factored.
+pub(super) fn solve<T: Real, const DIM: usize>(rows: &[BlockRow<T, DIM>], values: &mut [Point<T, DIM>]) {
+    let mut above = Point::<T, DIM>::zeros();
+    let mut above_two = Point::<T, DIM>::zeros();
+    for (row, value) in rows.iter().zip(values.iter_mut()) {
+        let rest = *value - row.one * above - row.two * above_two;
+        *value = forward(&row.here, &rest);
+        (above_two, above) = (above, *value);
+    }
+    // What the two rows below take from this one.
+    let mut pull_one = Point::<T, DIM>::zeros();
+    let mut pull_two = Point::<T, DIM>::zeros();
+    let mut pull_two_next = Point::<T, DIM>::zeros();
+    let used = rows.len().min(values.len());
+    for (row, value) in rows.iter().zip(values.get_mut(..used).unwrap_or_default()).rev() {
+        let rest = *value - pull_one - pull_two;
+        *value = backward(&row.here, &rest);
+        pull_one = row.one.transpose() * *value;
+        pull_two = pull_two_next;
+        pull_two_next = row.two.transpose() * *value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn rows(size: usize) -> Vec<BlockRow<f64, 2>> {
+        (0..size)
+            .map(|index| {
+                let k = index as f64;
+                BlockRow {
+                    here: Block::<f64, 2>::new(6.0 + k, 0.5, 0.5, 7.0),
+                    one: Block::<f64, 2>::new(-1.0, 0.2, 0.1, -1.5),
+                    two: Block::<f64, 2>::new(0.3, -0.1, 0.2, 0.4 + 0.01 * k),
+                }
+            })
+            .collect()
+    }
+
+    fn product(rows: &[BlockRow<f64, 2>], x: &[Point<f64, 2>]) -> Vec<Point<f64, 2>> {
+        let mut y: Vec<Point<f64, 2>> = rows.iter().zip(x).map(|(row, x)| row.here * x).collect();
+        for index in 0..rows.len() {
+            for (gap, block) in [(1, rows[index].one), (2, rows[index].two)] {
+                if index >= gap {
+                    y[index] += block * x[index - gap];
+                    y[index - gap] += block.transpose() * x[index];
+                }
+            }
+        }
+        y
+    }
+
+    #[test]
+    fn solves_what_the_definition_multiplies() {
+        for size in 1..8 {
+            let matrix = rows(size);
+            let x: Vec<_> = (0..size).map(|k| Point::<f64, 2>::new(1.0 + k as f64, 0.3 - k as f64)).collect();
+            let mut values = product(&matrix, &x);
+            let mut factored = matrix.clone();
+            assert!(factor(&mut factored, 0.0));
+            solve(&factored, &mut values);
+            for (value, expected) in values.iter().zip(&x) {
+                assert!(
+                    (value - expected).iter().all(|error| error.abs() < 1e-12),
+                    "size {size}: {value} {expected}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn says_what_is_not_positive_definite() {
+        let mut matrix = rows(4);
+        matrix[2].here[(1, 1)] = -3.0;
+        assert!(!factor(&mut matrix, 0.0));
+    }
+}

@@ -1,0 +1,555 @@
+//! Second-order refinement: a feasible primal-dual interior point method with banded Newton systems.
+//!
+//! It starts from a feasible plan drawn a little inside its bounds and follows the central path of logarithmic
+//! barriers: each step solves one Newton system in O(N), goes as far as bounds and the merit allow, and so stays
+//! strictly feasible throughout. Flight time, budgets and worst values are the border of the system; agents are
+//! coupled through the flight time exactly and through jamming by the gradient alone.
+//!
+//! | symbol | name |
+//! |---|---|
+//! | mu | `barrier` |
+//! | g, lambda | slack, multiplier |
+//! | delta | `shift`: multiple of the metric that makes an indefinite system definite |
+//!
+//! Limits: [`Settings::refinements`] steps; local, from the basin of its start; not used where a scenario has more
+//! than two worst-case terms an agent.
+
+mod assemble;
+mod barrier;
+mod block;
+mod extremes;
+mod rows;
+mod system;
+
+use heapless::Vec;
+
+use crate::math::Real;
+use crate::objective::merit::{Guard, Merit};
+use crate::objective::{self, Extreme};
+use crate::scenario::{Reduce, TERMS_MAX, Term, View};
+
+use super::controls::{Bound, Kind};
+use super::coordinates::{Frame, Iterate};
+use super::feasible::largest_share;
+use super::{Ledger, Settings, Status, Workspace, guard};
+use assemble::Source;
+use barrier::Multipliers;
+use extremes::Extremes;
+use system::{BUDGETS, COLUMNS, Controls, EXTREMES, PACE, System};
+
+/// Part of the pace that a start gives up to come inside its bounds.
+const INSIDE: f64 = 0.02;
+/// First barrier parameter over max(1, |objective|).
+const FIRST_BARRIER: f64 = 1e-3;
+/// Last barrier parameter over max(1, |objective|).
+const LAST_BARRIER: f64 = 1e-11;
+/// Factor between barrier parameters.
+const BARRIER_FACTOR: f64 = 0.1;
+/// The barrier parameter falls when a step predicts a decrease of less than this many of it.
+const CENTERED: f64 = 3.0;
+/// Part of the way to the boundary that a step may go.
+const TO_BOUNDARY: f64 = 0.99;
+/// Part of the predicted decrease that a step must bring.
+const SUFFICIENT: f64 = 1e-4;
+/// Factors tried for the shift of one system.
+const SHIFTS_MAX: usize = 24;
+/// Halvings of one step.
+const HALVINGS_MAX: usize = 25;
+/// Multipliers stay within this factor of mu / g.
+const MULTIPLIER_RANGE: f64 = 1e8;
+
+/// Memory of a refinement.
+#[derive(Clone, Debug)]
+pub(super) struct Refinement<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+    systems: [System<T, DIM, NODES>; AGENTS],
+    multipliers: [Multipliers<T, DIM, NODES>; AGENTS],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Refinement<T, DIM, NODES, AGENTS> {
+    pub(super) fn empty() -> Self {
+        Self {
+            systems: core::array::from_fn(|_| System::empty()),
+            multipliers: core::array::from_fn(|_| Multipliers::zeros()),
+        }
+    }
+}
+
+/// Improves the incumbent `workspace.best`, which must be feasible and clear of regions and limits.
+pub(super) fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Option<Status>
+where
+    T: Real,
+{
+    let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
+    let mut integral_terms = Vec::<Term<T>, TERMS_MAX>::new();
+    for term in scenario.terms.iter().filter(|term| term.reduce == Reduce::Integral) {
+        let _ = integral_terms.push(*term);
+    }
+    let plain = View { terms: &integral_terms, ..*scenario };
+    frame.collapse(&workspace.best, &mut workspace.iterate);
+    workspace.trial.clone_from(&workspace.best);
+    workspace.by_trajectory.clone_from(&workspace.best);
+    if !draw_inside(scenario, &frame, workspace) {
+        return None;
+    }
+    frame.expand(&workspace.iterate, &mut workspace.trial);
+    let extremes = Extremes::new(scenario, &workspace.trial, &mut workspace.scratch)?;
+    let scale = ledger.best.abs().max(T::one());
+    let mut path = CentralPath {
+        scenario,
+        plain: &plain,
+        settings,
+        frame: &frame,
+        extremes,
+        is_guarded: guard::is_needed(scenario),
+        barrier: T::real(FIRST_BARRIER) * scale,
+        barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
+        pace_multiplier: T::zero(),
+        shift: T::zero(),
+    };
+    Some(path.follow(workspace, ledger, deadline))
+}
+
+/// Draws the incumbent, in `workspace.iterate`, inside its bounds; false if that fails.
+fn draw_inside<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    frame: &Frame<T, DIM, AGENTS>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> bool
+where
+    T: Real,
+{
+    let domain = &scenario.frame.domain;
+    workspace.candidate.assign(&workspace.iterate, frame);
+    let mut inside = T::real(INSIDE);
+    for _ in 0..4 {
+        let Workspace { iterate, candidate, trial, scratch, .. } = workspace;
+        // The same path, flown a little slower.
+        let slower = candidate.pace * (T::one() - inside);
+        let pace = slower.max(frame.pace_min + (candidate.pace - frame.pace_min) * T::real(0.5));
+        let share = pace / candidate.pace;
+        iterate.pace = pace;
+        for ((mine, theirs), agent) in iterate.interior_mut(frame).zip(candidate.interior(frame)).zip(frame.agent()) {
+            let count = T::from_count(frame.intervals);
+            let gap = inside * T::real(0.2);
+            for (node, (mine, theirs)) in mine.iter_mut().zip(theirs).enumerate() {
+                *mine = theirs * share;
+                let line = agent.start + agent.line * (T::from_count(node + 1) / count);
+                let low = (domain.min - line) * (pace / agent.stride);
+                let high = (domain.max - line) * (pace / agent.stride);
+                for ((value, &low), &high) in mine.iter_mut().zip(low.iter()).zip(high.iter()) {
+                    let gap = gap.min((high - low) * T::real(0.25));
+                    *value = value.clamp_to(low + gap, high - gap);
+                }
+            }
+        }
+        for (slot, bound) in frame.equipment() {
+            let Bound::Level { allowance } = bound else { continue };
+            let levels = iterate.levels_mut(slot, frame.intervals);
+            let mut sum = T::zero();
+            for (mine, &theirs) in levels.iter_mut().zip(candidate.levels(slot, frame.intervals)) {
+                *mine = inside + (T::one() - inside - inside) * theirs;
+                sum += *mine;
+            }
+            let most = allowance * pace * (T::one() - inside);
+            if sum > most {
+                levels.iter_mut().for_each(|level| *level *= most / sum);
+            }
+        }
+        let is_inside = barrier::log_slacks(frame, domain, iterate).finite();
+        frame.expand(iterate, trial);
+        if is_inside && guard::smallest_slack(scenario, trial, scratch) > T::zero() {
+            return true;
+        }
+        inside *= T::real(0.2);
+    }
+    false
+}
+
+/// One refinement under way.
+struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
+    scenario: &'a View<'a, T, DIM>,
+    /// The problem with its integral terms only.
+    plain: &'a View<'a, T, DIM>,
+    settings: &'a Settings<T>,
+    frame: &'a Frame<T, DIM, AGENTS>,
+    extremes: Extremes<T>,
+    is_guarded: bool,
+    barrier: T,
+    barrier_last: T,
+    pace_multiplier: T,
+    shift: T,
+}
+
+/// A step of everything that is not in the iterate.
+struct Move<T> {
+    unknowns: Vec<[T; COLUMNS], 32>,
+    /// Predicted change of the merit.
+    slope: T,
+}
+
+impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGENTS> {
+    fn follow<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        self.reset_multipliers(workspace);
+        for _ in 0..self.settings.refinements {
+            if deadline() {
+                return Status::Deadline;
+            }
+            ledger.refinements += 1;
+            ledger.evaluations += 1;
+            let merit = self.differentiate(workspace);
+            let Some(step) = self.newton(workspace, ledger) else { return Status::Stalled };
+            let is_centered = -step.slope <= T::real(CENTERED) * self.barrier;
+            let Some(share) = self.advance(&step, merit, workspace, ledger) else {
+                if self.barrier <= self.barrier_last {
+                    return Status::Converged;
+                }
+                self.lower_barrier();
+                continue;
+            };
+            if is_centered && share > T::real(0.5) {
+                if self.barrier <= self.barrier_last {
+                    return Status::Converged;
+                }
+                self.lower_barrier();
+            }
+        }
+        Status::IterationLimit
+    }
+
+    fn lower_barrier(&mut self) {
+        self.barrier = (self.barrier * T::real(BARRIER_FACTOR)).max(self.barrier_last);
+    }
+
+    /// The merit of regions, separations, limits and integral terms; worst values and bounds have their own part.
+    fn merit(&self) -> Merit<T> {
+        let guard = if self.is_guarded { Guard::Barrier { weight: self.barrier } } else { Guard::None };
+        Merit { extreme: Extreme::Exact, objective: T::one(), guard }
+    }
+
+    /// What the step is to lower, at `trial` and the worst values moved by `share` of a step; infinite outside.
+    fn rest_of_merit<const NODES: usize>(
+        &self,
+        at: &Iterate<T, DIM, NODES, AGENTS>,
+        extremes: &Extremes<T>,
+        trial: &crate::Trajectory<T, DIM, NODES, AGENTS>,
+        scratch: &mut [crate::metrics::Sample<T, DIM>],
+    ) -> T {
+        let domain = &self.scenario.frame.domain;
+        let mut logs = barrier::log_slacks(self.frame, domain, at);
+        for worst in &extremes.0 {
+            let mut sum = barrier::LogSum::new();
+            worst.for_each(self.scenario, trial, scratch, |_, signed| sum.add(worst.value - signed));
+            logs += sum.total();
+        }
+        let value = extremes.total() - self.barrier * logs;
+        if value.finite() { value } else { T::INFINITY }
+    }
+
+    /// Value and gradient of guards and integral terms at the iterate; returns the whole merit.
+    fn differentiate<const NODES: usize, const SENSORS: usize>(
+        &self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> T {
+        let Workspace { iterate, trial, by_trajectory, gradient, scratch, .. } = workspace;
+        self.frame.expand(iterate, trial);
+        let value = guard::gradient(self.plain, trial, &self.merit(), scratch, by_trajectory);
+        self.frame.pull_back(iterate, by_trajectory, gradient);
+        value + self.rest_of_merit(iterate, &self.extremes, trial, scratch)
+    }
+
+    /// Multipliers at their central values.
+    fn reset_multipliers<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) {
+        let keep = |_: T, central: T| central;
+        self.pace_multiplier = self.barrier / (workspace.iterate.pace - self.frame.pace_min);
+        self.frame.expand(&workspace.iterate, &mut workspace.trial);
+        self.visit_multipliers(workspace, None, keep);
+    }
+
+    /// Replaces every multiplier by `update(old, mu / g, lambda change)`; with a step, slacks are those before it.
+    fn visit_multipliers<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        unknowns: Option<&Vec<[T; COLUMNS], 32>>,
+        update: impl Fn(T, T) -> T,
+    ) {
+        let Workspace { iterate, candidate, trial, scratch, refinement, .. } = workspace;
+        let (frame, barrier) = (self.frame, self.barrier);
+        let Refinement { systems, multipliers } = refinement;
+        // `candidate` is the iterate plus the whole step; the target of a multiplier is (mu - lambda dg) / g.
+        let step_of = |agent: usize| systems.get(agent);
+        let pace_step = if unknowns.is_some() { candidate.pace - iterate.pace } else { T::zero() };
+        let target = |slack: T, multiplier: T, change: T| (barrier - multiplier * change) / slack;
+        let sources = iterate.interior(frame).zip(frame.agent()).zip(multipliers.iter_mut());
+        for (index, ((offsets, agent), multipliers)) in sources.enumerate() {
+            let Some(system) = step_of(index) else { continue };
+            let interior = frame.intervals.saturating_sub(1);
+            let direction =
+                if unknowns.is_some() { system.step.path.get(..interior).unwrap_or_default() } else { &[] };
+            rows::for_each_ball(frame, agent, offsets, iterate.pace, |place, ball| {
+                let Some(multiplier) = multipliers.of_ball(place, frame.intervals) else { return };
+                let change = ball.slack_change(direction, pace_step);
+                *multiplier = update(*multiplier, target(ball.slack(), *multiplier, change));
+            });
+            let domain = &self.scenario.frame.domain;
+            barrier::for_each_wall(frame, domain, agent, (offsets, iterate.pace), |wall| {
+                let moved = direction.get(wall.node).and_then(|node| node.get(wall.component)).copied();
+                let change = wall.by_offset * moved.unwrap_or_default() + wall.by_pace * pace_step;
+                let side = multipliers.place.get_mut(wall.side).and_then(|side| side.get_mut(wall.node));
+                if let Some(multiplier) = side.and_then(|point| point.get_mut(wall.component)) {
+                    *multiplier = update(*multiplier, target(wall.slack, *multiplier, change));
+                }
+            });
+            for (kind, bound) in Kind::ALL.into_iter().zip(agent.controls) {
+                let Bound::Level { allowance } = bound else { continue };
+                let kind_index = kind as usize;
+                let levels = iterate.levels((index, kind), frame.intervals);
+                let there = candidate.levels((index, kind), frame.intervals);
+                let [low, high] = &mut multipliers.level;
+                let (mut rest, mut rest_change) = (allowance * iterate.pace, allowance * pace_step);
+                let sides = low[kind_index].iter_mut().zip(high[kind_index].iter_mut());
+                for ((low, high), (&level, &there)) in sides.zip(levels.iter().zip(there)) {
+                    let change = if unknowns.is_some() { there - level } else { T::zero() };
+                    *low = update(*low, target(level, *low, change));
+                    *high = update(*high, target(T::one() - level, *high, -change));
+                    (rest, rest_change) = (rest - level, rest_change - change);
+                }
+                let budget = &mut multipliers.budget[kind_index];
+                *budget = update(*budget, target(rest, *budget, rest_change));
+            }
+            for worst in self.extremes.of(index) {
+                let Some(nodes) = multipliers.extreme.get_mut(worst.slot) else { continue };
+                worst.for_each(self.scenario, trial, scratch, |node, signed| {
+                    // Towards the centre: the change of the metric itself is not known here.
+                    if let Some(multiplier) = nodes.get_mut(node - 1) {
+                        *multiplier = barrier / (worst.value - signed);
+                    }
+                });
+            }
+        }
+        let pace_slack = iterate.pace - frame.pace_min;
+        self.pace_multiplier = update(self.pace_multiplier, target(pace_slack, self.pace_multiplier, pace_step));
+    }
+
+    /// Solves the Newton system; the iterate plus the step is left in `workspace.candidate`.
+    fn newton<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+    ) -> Option<Move<T>> {
+        self.assemble(workspace);
+        let (global_weight, global_right) = self.pace_equation(workspace);
+        let smallest = T::real(1e-6) * (T::one() + self.barrier);
+        let mut shift = if self.shift > T::zero() { self.shift * T::real(0.25) } else { T::zero() };
+        for _ in 0..SHIFTS_MAX {
+            ledger.factorizations += 1;
+            if let Some(step) = self.solve(shift, (global_weight, global_right), workspace) {
+                self.shift = shift;
+                return Some(step);
+            }
+            shift = (shift * T::real(6.0)).max(smallest);
+        }
+        None
+    }
+
+    fn assemble<const NODES: usize, const SENSORS: usize>(
+        &self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) {
+        let Workspace { iterate, trial, gradient, scratch, refinement, .. } = workspace;
+        let Refinement { systems, multipliers } = refinement;
+        let source = Source {
+            plain: self.plain,
+            frame: self.frame,
+            iterate,
+            trajectory: trial,
+            gradient,
+            extremes: &self.extremes,
+            barrier: self.barrier,
+        };
+        let agents = self.frame.agent().zip(systems.iter_mut()).zip(multipliers);
+        for (index, ((agent, system), multipliers)) in agents.enumerate() {
+            let [jam, azimuth, dropout] = agent.controls.map(|bound| bound != Bound::Off);
+            let controls = if jam || azimuth || dropout { Controls::Some } else { Controls::None };
+            let mut used = [false; COLUMNS];
+            used[PACE] = true;
+            used[BUDGETS] = jam;
+            used[BUDGETS + 1] = dropout;
+            for worst in self.extremes.of(index) {
+                used[EXTREMES + worst.slot] = true;
+            }
+            system.clear(self.frame.intervals, controls, used);
+            source.fill(index, agent, multipliers, system, scratch);
+            for worst in self.extremes.of(index) {
+                system.border_right[EXTREMES + worst.slot] -= worst.weight;
+            }
+        }
+        if self.is_guarded {
+            let pace = iterate.pace;
+            guard::for_each_clearance(self.scenario, trial, |(index, node), slack, clearance| {
+                let frame = self.frame.agent().nth(index);
+                let parts = (systems.get_mut(index), iterate.offset.get(index), frame);
+                if let (Some(system), Some(offsets), Some(agent)) = parts {
+                    let stiffness = self.barrier / (slack * slack);
+                    let ends = [clearance.by_from, clearance.by_to];
+                    assemble::add_segment(system, (offsets, agent.stride / pace, pace), node, stiffness, &ends);
+                }
+            });
+        }
+    }
+
+    /// What the pace's own equation has besides the agents' parts: the gradient, the penalty's bend, its bound.
+    fn pace_equation<const NODES: usize, const SENSORS: usize>(
+        &self,
+        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> (T, T) {
+        let pace = workspace.iterate.pace;
+        let slack = pace - self.frame.pace_min;
+        let timing = &self.scenario.frame.time;
+        let duration = self.frame.duration(pace);
+        let late = (self.frame.start_time + duration - timing.target).max(T::zero());
+        let by_pace = -duration / pace;
+        let two = T::real(2.0);
+        let mut weight = self.pace_multiplier / slack;
+        if late > T::zero() {
+            weight += two * timing.penalty * (by_pace * by_pace - late * two * by_pace / pace);
+        }
+        (weight, self.barrier / slack - workspace.gradient.pace)
+    }
+
+    fn solve<const NODES: usize, const SENSORS: usize>(
+        &self,
+        shift: T,
+        (global_weight, global_right): (T, T),
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> Option<Move<T>> {
+        let Workspace { iterate, candidate, refinement, .. } = workspace;
+        let agents = self.frame.agents;
+        let mut weight = global_weight + shift * self.frame.inertia;
+        let mut right = global_right;
+        let mut reduced = Vec::<_, 32>::new();
+        for system in refinement.systems.iter_mut().take(agents) {
+            if !system.factor(shift) {
+                return None;
+            }
+        }
+        for system in refinement.systems.iter_mut().take(agents) {
+            system.solve_all();
+            let part = system.reduce()?;
+            weight += part.weight();
+            right += part.right();
+            let _ = reduced.push(part);
+        }
+        if weight.is_not_a_number() || weight <= T::zero() {
+            return None;
+        }
+        let pace = right / weight;
+        let mut step = Move { unknowns: Vec::new(), slope: -global_right * pace };
+        candidate.assign(iterate, self.frame);
+        candidate.pace = iterate.pace + pace;
+        for (system, part) in refinement.systems.iter_mut().zip(&reduced) {
+            let unknowns = system.expand(part, pace);
+            step.slope -= system.work(&unknowns);
+            let _ = step.unknowns.push(unknowns);
+        }
+        if !step.slope.finite() || step.slope >= T::zero() {
+            return None;
+        }
+        for (offsets, system) in candidate.interior_mut(self.frame).zip(&refinement.systems) {
+            for (offset, change) in offsets.iter_mut().zip(&system.step.path) {
+                *offset += change;
+            }
+        }
+        for ((agent, kind), _) in self.frame.equipment() {
+            let Some(system) = refinement.systems.get(agent) else { continue };
+            let levels = candidate.levels_mut((agent, kind), self.frame.intervals);
+            for (level, change) in levels.iter_mut().zip(&system.step.control) {
+                *level += change[kind as usize];
+            }
+        }
+        Some(step)
+    }
+
+    /// Goes along the step as far as bounds and merit allow; returns the share, or `None` if nothing was gained.
+    fn advance<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        step: &Move<T>,
+        merit: T,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+    ) -> Option<T> {
+        let domain = &self.scenario.frame.domain;
+        let Workspace { iterate, candidate, .. } = workspace;
+        let bounds = largest_share(self.frame, domain, iterate, candidate, iterate.pace)
+            .min(barrier::level_share(self.frame, iterate, candidate));
+        let mut share = if bounds < T::one() { bounds * T::real(TO_BOUNDARY) } else { T::one() };
+        let rounding = T::EPSILON * T::real(16.0) * merit.abs();
+        for _ in 0..HALVINGS_MAX {
+            let mut extremes = self.extremes.clone();
+            for worst in &mut extremes.0 {
+                let change = step.unknowns.get(worst.agent).and_then(|unknowns| unknowns.get(EXTREMES + worst.slot));
+                worst.value += share * change.copied().unwrap_or_default();
+            }
+            let Workspace { iterate, candidate, next, trial, scratch, .. } = workspace;
+            next.between(iterate, candidate, share, self.frame);
+            self.frame.expand(next, trial);
+            let rest = self.rest_of_merit(next, &extremes, trial, scratch);
+            ledger.evaluations += 1;
+            let value =
+                if rest.finite() { rest + guard::value(self.plain, trial, &self.merit(), scratch) } else { rest };
+            if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
+                self.keep_if_best(workspace, ledger);
+                self.frame.expand(&workspace.iterate, &mut workspace.trial);
+                let range = T::real(MULTIPLIER_RANGE);
+                self.visit_multipliers(workspace, Some(&step.unknowns), |old, target| {
+                    let floor = old * T::real(1.0 - TO_BOUNDARY);
+                    let moved = old + (target - old) * share.max(T::real(0.1));
+                    moved.max(floor).min(old * range)
+                });
+                core::mem::swap(&mut workspace.iterate, &mut workspace.next);
+                self.extremes = extremes;
+                self.hold_multipliers(workspace);
+                return Some(share);
+            }
+            share *= T::real(0.5);
+        }
+        None
+    }
+
+    /// Keeps multipliers near mu / g of the slacks that there are now.
+    fn hold_multipliers<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) {
+        let range = T::real(1e4);
+        self.frame.expand(&workspace.iterate, &mut workspace.trial);
+        self.visit_multipliers(workspace, None, |old, central| old.clamp_to(central / range, central * range));
+    }
+
+    /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better.
+    fn keep_if_best<const NODES: usize, const SENSORS: usize>(
+        &self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+    ) {
+        let objective = objective::value(self.scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
+        ledger.evaluations += 1;
+        if objective < ledger.best {
+            ledger.best = objective;
+            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+        }
+    }
+}

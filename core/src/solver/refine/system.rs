@@ -1,0 +1,415 @@
+//! The Newton system of one agent: banded in the path, eliminated node by node in the controls, bordered by what all
+//! nodes share.
+//!
+//! | symbol | name | shape |
+//! |---|---|---|
+//! | B | `rows`, path by path | N - 1 block rows |
+//! | C_i, G_i | `Local`, controls by controls and by the path around node i | `KINDS` square, `KINDS` x 2 `DIM` |
+//! | c_j | `columns`: pace, budgets, worst values | as an agent's part of the iterate |
+//!
+//! Budgets and worst values are extra unknowns of the border, so that everything else stays local; the border itself
+//! is a handful of numbers, reduced to one for the pace that the agents share.
+//!
+//! Limits: [`EXTREMES_MAX`] worst-case terms an agent.
+
+#![expect(clippy::needless_range_loop, reason = "rows and columns by the letters of the equations")]
+
+use crate::math::{Point, Real};
+use crate::solver::controls::KINDS;
+
+use super::block::{self, BlockRow};
+
+/// Worst-case terms that one agent can have in a refinement.
+pub(super) const EXTREMES_MAX: usize = 2;
+/// Columns of the border: the pace, a budget a kind of level, and the worst values.
+pub(super) const COLUMNS: usize = 1 + 2 + EXTREMES_MAX;
+/// The column of the pace.
+pub(super) const PACE: usize = 0;
+/// The first column of budgets: jamming, then dropout.
+pub(super) const BUDGETS: usize = 1;
+/// The first column of worst values.
+pub(super) const EXTREMES: usize = 3;
+
+/// An agent's part of a vector.
+#[derive(Clone, Debug)]
+pub(super) struct Part<T, const DIM: usize, const NODES: usize> {
+    /// By interior index: node - 1.
+    pub(super) path: [Point<T, DIM>; NODES],
+    /// By node - 1.
+    pub(super) control: [[T; KINDS]; NODES],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize> Part<T, DIM, NODES> {
+    pub(super) fn zeros() -> Self {
+        Self { path: [Point::zeros(); NODES], control: [[T::zero(); KINDS]; NODES] }
+    }
+
+    fn clear(&mut self, intervals: usize) {
+        self.path.iter_mut().take(intervals).for_each(|node| *node = Point::zeros());
+        self.control.iter_mut().take(intervals).for_each(|node| *node = [T::zero(); KINDS]);
+    }
+
+    fn assign(&mut self, from: &Self, intervals: usize) {
+        for (mine, theirs) in self.path.iter_mut().zip(&from.path).take(intervals) {
+            *mine = *theirs;
+        }
+        for (mine, theirs) in self.control.iter_mut().zip(&from.control).take(intervals) {
+            *mine = *theirs;
+        }
+    }
+
+    fn dot(&self, other: &Self, intervals: usize, has_controls: Controls) -> T {
+        let mut sum = T::zero();
+        for (a, b) in self.path.iter().zip(&other.path).take(intervals.saturating_sub(1)) {
+            sum += a.dot(b);
+        }
+        if has_controls == Controls::Some {
+            for (a, b) in self.control.iter().zip(&other.control).take(intervals) {
+                for (&a, &b) in a.iter().zip(b) {
+                    sum += a * b;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Whether an agent controls anything besides its path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Controls {
+    None,
+    Some,
+}
+
+/// A node's controls: their matrix, its factor, and what couples them to the path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Local<T, const DIM: usize> {
+    pub(super) matrix: [[T; KINDS]; KINDS],
+    /// Lower triangle with inverted diagonal.
+    factor: [[T; KINDS]; KINDS],
+    /// By kind: to this node's offset.
+    pub(super) here: [Point<T, DIM>; KINDS],
+    /// By kind: to the offset of the node before.
+    pub(super) before: [Point<T, DIM>; KINDS],
+}
+
+impl<T: Real, const DIM: usize> Local<T, DIM> {
+    fn zeros() -> Self {
+        let none = [[T::zero(); KINDS]; KINDS];
+        Self { matrix: none, factor: none, here: [Point::zeros(); KINDS], before: [Point::zeros(); KINDS] }
+    }
+
+    /// Factors the matrix with `shift` on the diagonal; false if it is not positive definite. Kinds that do not
+    /// exist have a zero diagonal and stay out.
+    fn factor(&mut self, shift: T) -> bool {
+        let mut lower = [[T::zero(); KINDS]; KINDS];
+        for column in 0..KINDS {
+            let exists = self.matrix[column][column] != T::zero();
+            let mut pivot = if exists { self.matrix[column][column] + shift } else { T::one() };
+            for k in 0..column {
+                pivot -= lower[column][k] * lower[column][k];
+            }
+            if pivot.is_not_a_number() || pivot <= T::zero() {
+                return false;
+            }
+            let inverse = T::one() / pivot.sqrt();
+            lower[column][column] = inverse;
+            for row in column + 1..KINDS {
+                let mut sum = self.matrix[row][column];
+                for k in 0..column {
+                    sum -= lower[row][k] * lower[column][k];
+                }
+                lower[row][column] = sum * inverse;
+            }
+        }
+        self.factor = lower;
+        true
+    }
+
+    /// C^-1 v.
+    fn solve(&self, mut values: [T; KINDS]) -> [T; KINDS] {
+        for row in 0..KINDS {
+            for k in 0..row {
+                values[row] -= self.factor[row][k] * values[k];
+            }
+            values[row] *= self.factor[row][row];
+        }
+        for row in (0..KINDS).rev() {
+            for k in row + 1..KINDS {
+                values[row] -= self.factor[k][row] * values[k];
+            }
+            values[row] *= self.factor[row][row];
+        }
+        values
+    }
+}
+
+/// sum over kinds of a_k b_k', a block.
+fn outer<T: Real, const DIM: usize>(a: &[Point<T, DIM>; KINDS], b: &[Point<T, DIM>; KINDS]) -> block::Block<T, DIM> {
+    let mut sum = block::Block::zeros();
+    for (a, b) in a.iter().zip(b) {
+        sum += a * b.transpose();
+    }
+    sum
+}
+
+/// One agent's system.
+#[derive(Clone, Debug)]
+pub(super) struct System<T, const DIM: usize, const NODES: usize> {
+    pub(super) rows: [BlockRow<T, DIM>; NODES],
+    factored: [BlockRow<T, DIM>; NODES],
+    pub(super) local: [Local<T, DIM>; NODES],
+    pub(super) columns: [Part<T, DIM, NODES>; COLUMNS],
+    solved: [Part<T, DIM, NODES>; COLUMNS],
+    /// Minus the gradient.
+    pub(super) right: Part<T, DIM, NODES>,
+    /// The step, once solved.
+    pub(super) step: Part<T, DIM, NODES>,
+    /// Border by border, upper left of the reduced system.
+    pub(super) border: [[T; COLUMNS]; COLUMNS],
+    /// Right-hand side of the border.
+    pub(super) border_right: [T; COLUMNS],
+    /// Which columns are in use.
+    pub(super) used: [bool; COLUMNS],
+    pub(super) controls: Controls,
+    pub(super) intervals: usize,
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
+    pub(super) fn empty() -> Self {
+        Self {
+            rows: [BlockRow::zeros(); NODES],
+            factored: [BlockRow::zeros(); NODES],
+            local: [Local::zeros(); NODES],
+            columns: core::array::from_fn(|_| Part::zeros()),
+            solved: core::array::from_fn(|_| Part::zeros()),
+            right: Part::zeros(),
+            step: Part::zeros(),
+            border: [[T::zero(); COLUMNS]; COLUMNS],
+            border_right: [T::zero(); COLUMNS],
+            used: [false; COLUMNS],
+            controls: Controls::None,
+            intervals: 0,
+        }
+    }
+
+    /// Zeros for a number of intervals.
+    pub(super) fn clear(&mut self, intervals: usize, controls: Controls, used: [bool; COLUMNS]) {
+        self.intervals = intervals;
+        self.controls = controls;
+        self.used = used;
+        self.rows.iter_mut().take(intervals).for_each(|row| *row = BlockRow::zeros());
+        if controls == Controls::Some {
+            self.local.iter_mut().take(intervals).for_each(|local| *local = Local::zeros());
+        }
+        for (column, _) in self.columns.iter_mut().zip(used).filter(|(_, used)| *used) {
+            column.clear(intervals);
+        }
+        self.right.clear(intervals);
+        self.border = [[T::zero(); COLUMNS]; COLUMNS];
+        self.border_right = [T::zero(); COLUMNS];
+    }
+
+    /// Factors with `shift` times the metric added; false if the result is not positive definite.
+    #[must_use]
+    pub(super) fn factor(&mut self, shift: T) -> bool {
+        let interior = self.intervals.saturating_sub(1);
+        let two = T::real(2.0);
+        for (factored, row) in self.factored.iter_mut().zip(&self.rows).take(interior) {
+            *factored = *row;
+            for k in 0..DIM {
+                factored.here[(k, k)] += two * shift;
+                factored.one[(k, k)] -= shift;
+            }
+        }
+        if self.controls == Controls::Some {
+            for (index, local) in self.local.iter_mut().enumerate().take(self.intervals) {
+                if !local.factor(shift) {
+                    return false;
+                }
+                let solved_here = columns_solved(local, &local.here);
+                let solved_before = columns_solved(local, &local.before);
+                let before = index.checked_sub(1);
+                if index < interior
+                    && let Some(row) = self.factored.get_mut(index)
+                {
+                    row.here -= outer(&local.here, &solved_here);
+                    row.one -= outer(&local.here, &solved_before);
+                }
+                if let Some(row) = before.and_then(|before| self.factored.get_mut(before)) {
+                    row.here -= outer(&local.before, &solved_before);
+                }
+            }
+        }
+        block::factor(self.factored.get_mut(..interior).unwrap_or_default(), T::zero())
+    }
+
+    /// Solves for the right-hand side and every column in use.
+    pub(super) fn solve_all(&mut self) {
+        let Self { factored, local, columns, solved, right, step, used, controls, intervals, .. } = self;
+        let matrix = Matrix { factored, local, controls: *controls, intervals: *intervals };
+        for ((solved, column), _) in solved.iter_mut().zip(columns).zip(used).filter(|(_, used)| **used) {
+            solved.assign(column, matrix.intervals);
+            matrix.solve(solved);
+        }
+        step.assign(right, matrix.intervals);
+        matrix.solve(step);
+    }
+
+    /// The reduced border: the pace's own equation, `weight * pace = right`, after this agent's part is eliminated;
+    /// `None` if a worst value's pivot is not positive.
+    pub(super) fn reduce(&self) -> Option<Reduced<T>> {
+        let mut matrix = self.border;
+        let mut right = self.border_right;
+        for a in 0..COLUMNS {
+            if !self.used[a] {
+                continue;
+            }
+            right[a] -= self.columns[a].dot(&self.step, self.intervals, self.controls);
+            for b in 0..COLUMNS {
+                if self.used[b] {
+                    matrix[a][b] -= self.columns[a].dot(&self.solved[b], self.intervals, self.controls);
+                }
+            }
+        }
+        // Budgets have negative pivots, worst values positive ones; the pace is last and stays.
+        for pivot_index in 1..COLUMNS {
+            if !self.used[pivot_index] {
+                continue;
+            }
+            let pivot = matrix[pivot_index][pivot_index];
+            let is_budget = pivot_index < EXTREMES;
+            let is_sound = if is_budget { pivot < T::zero() } else { pivot > T::zero() };
+            if !is_sound {
+                return None;
+            }
+            for row in (0..COLUMNS).filter(|&row| row == PACE || row > pivot_index) {
+                if !self.used[row] {
+                    continue;
+                }
+                let share = matrix[row][pivot_index] / pivot;
+                for column in 0..COLUMNS {
+                    let above = matrix[pivot_index][column];
+                    matrix[row][column] -= share * above;
+                }
+                right[row] -= share * right[pivot_index];
+            }
+        }
+        Some(Reduced { matrix, right })
+    }
+
+    /// The border's unknowns for a change of pace, and the agent's part of the step, left in `step`.
+    pub(super) fn expand(&mut self, reduced: &Reduced<T>, pace: T) -> [T; COLUMNS] {
+        let mut unknowns = [T::zero(); COLUMNS];
+        unknowns[PACE] = pace;
+        for row in (1..COLUMNS).rev() {
+            if !self.used[row] {
+                continue;
+            }
+            let mut rest = reduced.right[row] - reduced.matrix[row][PACE] * pace;
+            for column in row + 1..COLUMNS {
+                rest -= reduced.matrix[row][column] * unknowns[column];
+            }
+            unknowns[row] = rest / reduced.matrix[row][row];
+        }
+        for (column, (&unknown, &used)) in unknowns.iter().zip(&self.used).enumerate() {
+            if !used || unknown == T::zero() {
+                continue;
+            }
+            let solved = &self.solved[column];
+            for (value, part) in self.step.path.iter_mut().zip(&solved.path).take(self.intervals) {
+                *value -= part * unknown;
+            }
+            if self.controls == Controls::Some {
+                for (values, parts) in self.step.control.iter_mut().zip(&solved.control).take(self.intervals) {
+                    for (value, &part) in values.iter_mut().zip(parts) {
+                        *value -= part * unknown;
+                    }
+                }
+            }
+        }
+        unknowns
+    }
+
+    /// Minus the gradient times the step, the shared part of the pace aside.
+    pub(super) fn work(&self, unknowns: &[T; COLUMNS]) -> T {
+        let border = self.border_right.iter().zip(unknowns).zip(&self.used).filter(|(_, used)| **used);
+        let border = border.fold(T::zero(), |sum, ((&right, &unknown), _)| sum + right * unknown);
+        border + self.right.dot(&self.step, self.intervals, self.controls)
+    }
+}
+
+/// The factored part of a system, on loan.
+struct Matrix<'a, T, const DIM: usize> {
+    factored: &'a [BlockRow<T, DIM>],
+    local: &'a [Local<T, DIM>],
+    controls: Controls,
+    intervals: usize,
+}
+
+impl<T: Real, const DIM: usize> Matrix<'_, T, DIM> {
+    /// Controls are eliminated into the path, the path is solved, and the controls follow from it.
+    fn solve<const NODES: usize>(&self, part: &mut Part<T, DIM, NODES>) {
+        let interior = self.intervals.saturating_sub(1);
+        let Part { path, control } = part;
+        let path = path.get_mut(..interior).unwrap_or_default();
+        if self.controls == Controls::Some {
+            for (index, (local, values)) in self.local.iter().zip(control.iter()).enumerate().take(self.intervals) {
+                for (kind, value) in local.solve(*values).into_iter().enumerate() {
+                    if let Some(node) = path.get_mut(index) {
+                        *node -= local.here[kind] * value;
+                    }
+                    if let Some(node) = index.checked_sub(1).and_then(|before| path.get_mut(before)) {
+                        *node -= local.before[kind] * value;
+                    }
+                }
+            }
+        }
+        block::solve(self.factored, path);
+        if self.controls == Controls::Some {
+            let zero = Point::<T, DIM>::zeros();
+            for (index, (local, values)) in self.local.iter().zip(control).enumerate().take(self.intervals) {
+                let here = path.get(index).copied().unwrap_or(zero);
+                let before = index.checked_sub(1).and_then(|before| path.get(before)).copied().unwrap_or(zero);
+                for (kind, value) in values.iter_mut().enumerate() {
+                    *value -= local.here[kind].dot(&here) + local.before[kind].dot(&before);
+                }
+                *values = local.solve(*values);
+            }
+        }
+    }
+}
+
+/// C^-1 applied to the coupling, kind by kind.
+fn columns_solved<T: Real, const DIM: usize>(
+    local: &Local<T, DIM>,
+    coupling: &[Point<T, DIM>; KINDS],
+) -> [Point<T, DIM>; KINDS] {
+    let mut solved = [Point::<T, DIM>::zeros(); KINDS];
+    for component in 0..DIM {
+        let values = local.solve(core::array::from_fn(|kind| coupling[kind][component]));
+        for (kind, value) in values.into_iter().enumerate() {
+            solved[kind][component] = value;
+        }
+    }
+    solved
+}
+
+/// An eliminated border.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reduced<T> {
+    matrix: [[T; COLUMNS]; COLUMNS],
+    right: [T; COLUMNS],
+}
+
+impl<T: Real> Reduced<T> {
+    /// Coefficient of the pace in its own equation.
+    pub(super) fn weight(&self) -> T {
+        self.matrix[PACE][PACE]
+    }
+
+    /// Right-hand side of the pace's equation.
+    pub(super) fn right(&self) -> T {
+        self.right[PACE]
+    }
+}

@@ -1,0 +1,196 @@
+//! Where planning starts: a feasible iterate, and an anchor strictly inside the bounds.
+//!
+//! Without start velocities the straight line at constant speed is feasible whenever the goal can be reached, and
+//! strictly so for any flight time longer than the shortest. With them, the straight line is projected on the
+//! bounds at one flight time after another until a feasible path comes out.
+
+use crate::constraints;
+use crate::error::{Error, Fault, Item};
+use crate::math::{Point, Real, norm, norm_squared};
+use crate::scenario::View;
+use crate::trajectory::Trajectory;
+
+use super::coordinates::{Frame, Iterate};
+use super::projection::Request;
+use super::{Settings, Workspace};
+
+/// Flight times tried, as multiples of the shortest, until a path that follows the start velocity is found.
+const STRETCHES: [f64; 6] = [1.05, 1.2, 1.5, 2.0, 3.0, 5.0];
+
+/// Part of a budget that the first controls use, and the largest first level.
+const FIRST_SHARE: f64 = 0.5;
+
+/// Where a plan begins.
+#[derive(Clone, Copy, Debug)]
+pub enum Start<'a, T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+    /// Straight lines at constant speed.
+    Straight,
+    /// The best of several lattice searches over the whole domain and of the straight lines.
+    Global,
+    /// A trajectory of the caller, such as an earlier plan; it is used if it is feasible, and otherwise the
+    /// straight lines are.
+    Given(&'a Trajectory<T, DIM, NODES, AGENTS>),
+}
+
+/// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4.
+pub(super) fn shortest_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
+    let times = scenario.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
+    times.fold(T::zero(), T::max)
+}
+
+/// Whether the time there is is the shortest flight time itself: then the straight line is all there is, and the
+/// feasible set has no interior to search.
+pub(super) fn is_straight_only<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
+    let allowed = scenario.frame.time.max - scenario.frame.start_time;
+    let has_free_start = scenario.agents.iter().all(|agent| agent.start_velocity.is_none());
+    let slack = allowed - shortest_duration(scenario);
+    has_free_start && slack <= allowed * T::EPSILON * T::real(16.0) || scenario.frame.intervals < 2
+}
+
+/// A sensible flight time to begin with: the target, if there is one that can be met, and a little more than the
+/// shortest otherwise.
+fn first_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
+    let frame = &scenario.frame;
+    let allowed = frame.time.max - frame.start_time;
+    let shortest = shortest_duration(scenario);
+    let wanted = if frame.time.penalty > T::zero() && frame.time.target > frame.start_time {
+        frame.time.target - frame.start_time
+    } else {
+        shortest * T::real(1.3)
+    };
+    let least = shortest * T::real(1.05);
+    if wanted.max(least) < allowed { wanted.max(least) } else { (shortest + allowed) * T::real(0.5) }
+}
+
+/// Fills `workspace.best` and `workspace.iterate` with a feasible start, `workspace.anchor` with a strictly
+/// feasible iterate, and returns the frame that they are measured in.
+pub(super) fn lay<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    start: Start<'_, T, DIM, NODES, AGENTS>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> Result<(), Error>
+where
+    T: Real,
+{
+    let allowed = scenario.frame.time.max - scenario.frame.start_time;
+    if is_straight_only(scenario) {
+        workspace.best = Trajectory::straight(scenario, allowed)?;
+        return Ok(());
+    }
+    if let Start::Given(given) = start {
+        let fits = given.intervals() == scenario.frame.intervals && given.agents() == scenario.agents.len();
+        if fits && is_feasible(scenario, given, workspace) {
+            workspace.best.clone_from(given);
+            return Ok(());
+        }
+    }
+    let has_velocity = scenario.agents.iter().any(|agent| agent.start_velocity.is_some());
+    let first = first_duration(scenario);
+    if !has_velocity {
+        workspace.best = Trajectory::straight(scenario, first)?;
+        lay_controls(scenario, &mut workspace.best);
+        return Ok(());
+    }
+    let shortest = shortest_duration(scenario).max(first * T::real(0.1));
+    for stretch in STRETCHES {
+        let duration = (shortest * T::real(stretch)).min(allowed);
+        if follow_start_velocity(scenario, settings, duration, workspace)? {
+            return Ok(());
+        }
+    }
+    let agent = scenario.agents.iter().position(|agent| agent.start_velocity.is_some()).unwrap_or_default();
+    Err(Error::new(Item::Agent(agent), "start_velocity", Fault::StartVelocity))
+}
+
+fn is_feasible<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> bool
+where
+    T: Real,
+{
+    let violations = constraints::violations(scenario, trajectory, &mut workspace.scratch);
+    violations.worst().1 <= T::real(constraints::TOLERANCE)
+}
+
+/// Projects the straight line of the given flight time on the bounds; true if what comes out is feasible, and
+/// then in `workspace.best`.
+fn follow_start_velocity<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    duration: T,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> Result<bool, Error>
+where
+    T: Real,
+{
+    let frame = Frame::<T, DIM, AGENTS>::new(scenario, duration);
+    workspace.trial = Trajectory::straight(scenario, duration)?;
+    frame.collapse(&workspace.trial, &mut workspace.iterate);
+    let mut none = Iterate::zeros();
+    none.pace = T::zero();
+    workspace.projection.prepare(&frame);
+    let request = Request {
+        frame: &frame,
+        domain: &scenario.frame.domain,
+        step: T::one(),
+        margin: settings.margin * T::real(100.0),
+        tolerance: settings.margin * T::real(10.0),
+        steps_max: settings.projection_steps * 10,
+    };
+    workspace.projection.project(&request, &workspace.iterate, &none, &mut workspace.candidate);
+    frame.expand(&workspace.candidate, &mut workspace.trial);
+    let violations = constraints::violations(scenario, &workspace.trial, &mut workspace.scratch);
+    let is_inside = violations.worst().1 <= T::zero();
+    if is_inside {
+        workspace.best.clone_from(&workspace.trial);
+        lay_controls(scenario, &mut workspace.best);
+    }
+    Ok(is_inside)
+}
+
+/// Spreads a part of each budget evenly over the flight, and points beams at the nearest ranging sensor.
+///
+/// A beam that emits nothing, or that reaches no sensor, has no gradient to improve it by.
+fn lay_controls<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+) {
+    let (nodes, duration) = (trajectory.nodes(), trajectory.duration());
+    let times = trajectory.times;
+    let level = |budget: T| (budget * T::real(FIRST_SHARE) / duration).min(T::real(FIRST_SHARE));
+    for (track, agent) in trajectory.active_mut().iter_mut().zip(scenario.agents) {
+        if let Some(jammer) = agent.jammer {
+            track.jam.get_mut(1..nodes).unwrap_or_default().fill(level(jammer.budget));
+            let places = track.path.iter().zip(&times).take(nodes);
+            for (azimuth, (position, &time)) in track.azimuth.iter_mut().zip(places) {
+                *azimuth = azimuth_of_nearest(scenario, position, time);
+            }
+        }
+        if let Some(dropout) = agent.dropout {
+            track.dropout.get_mut(1..nodes).unwrap_or_default().fill(level(dropout.budget));
+        }
+    }
+}
+
+/// Direction from a position to the nearest ranging sensor, rad; 0 where there is none.
+fn azimuth_of_nearest<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    position: &Point<T, DIM>,
+    time: T,
+) -> T {
+    let mut nearest = (T::INFINITY, T::zero());
+    for sensor in scenario.sensors.iter().filter(|sensor| sensor.ranging.is_some()) {
+        let offset = scenario.sensor_state(sensor, time).0 - position;
+        let square = norm_squared(&offset);
+        if square < nearest.0 {
+            let mut components = offset.iter().copied();
+            let east = components.next().unwrap_or_default();
+            let north = components.next().unwrap_or_default();
+            nearest = (square, north.atan2(east));
+        }
+    }
+    nearest.1
+}

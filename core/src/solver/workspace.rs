@@ -1,0 +1,82 @@
+//! All memory that planning needs, owned by the caller.
+
+use crate::math::Real;
+use crate::metrics::Sample;
+use crate::trajectory::Trajectory;
+use crate::warm_start::Lattice;
+
+use super::coordinates::Iterate;
+use super::projection::Projection;
+use super::refine::Refinement;
+
+/// Cells of the global start's lattice.
+pub const LATTICE_CELLS: usize = 1024;
+/// Entries of the lattice's parents: one a cell and slice of time.
+pub const LATTICE_PARENTS: usize = 16 * LATTICE_CELLS;
+
+/// Memory for planning `AGENTS` agents over `NODES` nodes among `SENSORS` sensors.
+///
+/// Its size is `size_of::<Workspace<..>>()`: a constant, to be placed in a static or a box. Nothing in it needs to
+/// be kept between two plans except, where wanted, the plan itself.
+#[derive(Clone, Debug)]
+pub struct Workspace<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize> {
+    pub(super) best: Trajectory<T, DIM, NODES, AGENTS>,
+    pub(super) trial: Trajectory<T, DIM, NODES, AGENTS>,
+    pub(super) by_trajectory: Trajectory<T, DIM, NODES, AGENTS>,
+    pub(super) iterate: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) candidate: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) next: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) anchor: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) gradient: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) gradient_next: Iterate<T, DIM, NODES, AGENTS>,
+    pub(super) projection: Projection<T, DIM, NODES, AGENTS>,
+    pub(super) refinement: Refinement<T, DIM, NODES, AGENTS>,
+    /// What the global start begins with, and the best candidate so far.
+    pub(super) base: Trajectory<T, DIM, NODES, AGENTS>,
+    pub(super) champion: Trajectory<T, DIM, NODES, AGENTS>,
+    pub(super) lattice: Lattice<T, LATTICE_CELLS, LATTICE_PARENTS>,
+    pub(super) scratch: [Sample<T, DIM>; SENSORS],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>
+    Workspace<T, DIM, NODES, SENSORS, AGENTS>
+{
+    /// A workspace that holds no plan.
+    #[must_use]
+    pub fn new() -> Self {
+        Self {
+            best: Trajectory::empty(),
+            trial: Trajectory::empty(),
+            by_trajectory: Trajectory::empty(),
+            iterate: Iterate::zeros(),
+            candidate: Iterate::zeros(),
+            next: Iterate::zeros(),
+            anchor: Iterate::zeros(),
+            gradient: Iterate::zeros(),
+            gradient_next: Iterate::zeros(),
+            projection: Projection::empty(),
+            refinement: Refinement::empty(),
+            base: Trajectory::empty(),
+            champion: Trajectory::empty(),
+            lattice: Lattice::new(),
+            scratch: core::array::from_fn(|_| Sample::default()),
+        }
+    }
+
+    /// The plan: the best feasible trajectory that the last call found.
+    #[must_use]
+    pub const fn best(&self) -> &Trajectory<T, DIM, NODES, AGENTS> {
+        &self.best
+    }
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize> Default
+    for Workspace<T, DIM, NODES, SENSORS, AGENTS>
+{
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What 64 intervals, 16 sensors and one agent take in single precision.
+const _: () = assert!(size_of::<Workspace<f32, 2, 65, 16, 1>>() <= 88 * 1024);

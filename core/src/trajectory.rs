@@ -1,0 +1,158 @@
+//! Paths and controls of all agents on one time grid: what the planner decides.
+//!
+//! | symbol | name | unit | shape |
+//! |---|---|---|---|
+//! | t_i | `times` | s | N + 1 |
+//! | x_i | `path` | scenario length unit | N + 1 points an agent |
+//! | z_i | `jam` | 0 .. 1 | N + 1 an agent |
+//! | alpha_i | `azimuth` | rad, counter-clockwise from east | N + 1 an agent |
+//! | theta_i | `dropout` | 0 .. 1, 1 is silence | N + 1 an agent |
+//!
+//! The planner keeps the intervals equal (section 4.1); a path flown in steps may have unequal ones.
+//! A gradient has the same shape, each entry the derivative by its namesake.
+//!
+//! Limits: `NODES` holds N + 1 nodes, `AGENTS` agents.
+
+use crate::error::{Error, Fault, Item};
+use crate::math::{Point, Real};
+use crate::scenario::View;
+
+/// One agent's path and controls; entries past the last node are zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Track<T, const DIM: usize, const NODES: usize> {
+    /// Positions x_i, length units.
+    pub path: [Point<T, DIM>; NODES],
+    /// Jamming levels z_i, 0 to 1.
+    pub jam: [T; NODES],
+    /// Jamming directions alpha_i, rad.
+    pub azimuth: [T; NODES],
+    /// Reductions of transmit power theta_i, 0 to 1; 1 is silence.
+    pub dropout: [T; NODES],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize> Track<T, DIM, NODES> {
+    /// All zeros.
+    #[must_use]
+    pub fn zeros() -> Self {
+        let zero = [T::zero(); NODES];
+        Self { path: [Point::zeros(); NODES], jam: zero, azimuth: zero, dropout: zero }
+    }
+}
+
+/// Paths and controls of all agents, or a derivative by them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+    intervals: usize,
+    agents: usize,
+    /// Node times t_i, s.
+    pub times: [T; NODES],
+    /// One track an agent; past the last agent they are zero.
+    pub tracks: [Track<T, DIM, NODES>; AGENTS],
+}
+
+impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Trajectory<T, DIM, NODES, AGENTS> {
+    /// All zeros, on no interval.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self { intervals: 0, agents: 0, times: [T::zero(); NODES], tracks: [Track::zeros(); AGENTS] }
+    }
+
+    /// All zeros, of the given size.
+    ///
+    /// # Errors
+    /// `grid.intervals` or `agent` where they exceed the capacities.
+    pub fn zeros(intervals: usize, agents: usize) -> Result<Self, Error> {
+        let mut zeros = Self::empty();
+        zeros.resize(intervals, agents)?;
+        Ok(zeros)
+    }
+
+    /// Sets the number of intervals and of agents; entries keep their values.
+    ///
+    /// # Errors
+    /// `grid.intervals` or `agent` where they exceed the capacities.
+    pub fn resize(&mut self, intervals: usize, agents: usize) -> Result<(), Error> {
+        if intervals >= NODES {
+            let fault = Fault::TooMany { count: intervals, capacity: NODES.saturating_sub(1) };
+            return Err(Error::new(Item::Scenario, "grid.intervals", fault));
+        }
+        if agents > AGENTS {
+            let fault = Fault::TooMany { count: agents, capacity: AGENTS };
+            return Err(Error::new(Item::Scenario, "agent", fault));
+        }
+        self.intervals = intervals;
+        self.agents = agents;
+        Ok(())
+    }
+
+    /// Straight lines from start to goal at constant speed, without jamming or dropout.
+    ///
+    /// # Errors
+    /// `grid.intervals` or `agent` where the scenario exceeds the capacities.
+    pub fn straight(scenario: &View<'_, T, DIM>, duration: T) -> Result<Self, Error> {
+        let intervals = scenario.frame.intervals;
+        let mut straight = Self::zeros(intervals, scenario.agents.len())?;
+        straight.set_duration(scenario.frame.start_time, duration);
+        for (track, agent) in straight.tracks.iter_mut().zip(scenario.agents) {
+            for (node, position) in track.path.iter_mut().enumerate().take(intervals + 1) {
+                let share = T::from_count(node) / T::from_count(intervals);
+                *position = agent.start + (agent.goal - agent.start) * share;
+            }
+            if let Some(goal) = track.path.get_mut(intervals) {
+                *goal = agent.goal;
+            }
+        }
+        Ok(straight)
+    }
+
+    /// Intervals N.
+    #[must_use]
+    pub const fn intervals(&self) -> usize {
+        self.intervals
+    }
+
+    /// Nodes, N + 1.
+    #[must_use]
+    pub const fn nodes(&self) -> usize {
+        self.intervals + 1
+    }
+
+    /// Number of agents.
+    #[must_use]
+    pub const fn agents(&self) -> usize {
+        self.agents
+    }
+
+    /// Time at node 0, s.
+    #[must_use]
+    pub fn start_time(&self) -> T {
+        self.times.first().copied().unwrap_or_default()
+    }
+
+    /// Flight time tau, s.
+    #[must_use]
+    pub fn duration(&self) -> T {
+        self.times.get(self.intervals).copied().unwrap_or_default() - self.start_time()
+    }
+
+    /// Lays N equal intervals over `duration` seconds from `start_time`.
+    pub fn set_duration(&mut self, start_time: T, duration: T) {
+        let nodes = self.nodes();
+        let interval = duration / T::from_count(self.intervals.max(1));
+        for (node, time) in self.times.iter_mut().enumerate().take(nodes) {
+            *time = start_time + interval * T::from_count(node);
+        }
+    }
+
+    /// The tracks of the agents there are.
+    #[must_use]
+    pub fn active(&self) -> &[Track<T, DIM, NODES>] {
+        self.tracks.get(..self.agents).unwrap_or_default()
+    }
+
+    /// The tracks of the agents there are, to change.
+    pub fn active_mut(&mut self) -> &mut [Track<T, DIM, NODES>] {
+        let agents = self.agents.min(AGENTS);
+        self.tracks.get_mut(..agents).unwrap_or_default()
+    }
+}

@@ -1,0 +1,544 @@
+//! The global start: dynamic programming over cells and slices of time, for one agent with the others frozen.
+//!
+//! A local method finds the best path of the basin that it starts in, and the straight line may lie in a poor one.
+//! [`search`] looks at all of them, coarsely: it cuts the part of the domain that can be reached into cells and the
+//! flight into slices of a few cells each, and finds the cheapest way from start to goal,
+//!
+//! C_k(c) = min over cells b within reach of c of C_(k-1)(b) + dt mean of the running cost from b to c,
+//!
+//! where the running cost is the scenario's own at the slice's time. Start and goal are exact points. The result
+//! keeps the reach per slice, not the acceleration bound, and is there to be projected on the bounds and polished.
+//!
+//! | symbol | name | unit | shape |
+//! |---|---|---|---|
+//! | tau | `duration` | s | |
+//! | | `reach` | cells a slice | |
+//! | | `inflation` | | |
+//! | C_k | `cost` | objective unit | cells |
+//!
+//! The lattice knows few directions, so that its paths are longer than need be: an `inflation` of the speed makes up
+//! for that, and what is too fast the projection takes back.
+//!
+//! Costs have peaks at sensors that are narrower than a cell, and location errors are largest there: a cell that holds
+//! a sensor costs what flying over the sensor does, where that is less than its centre, and the path goes there.
+//!
+//! Limits: 255 moves from a cell; a lagged reference point is taken as the present position; jamming and dropout
+//! last the whole flight at the level that their budgets allow.
+
+mod field;
+mod grid;
+
+use heapless::Vec;
+
+use crate::constraints::region::horizontal;
+use crate::math::{Point, Real, norm};
+use crate::metrics::Sample;
+use crate::scenario::{Reduce, View};
+use crate::trajectory::Trajectory;
+
+use field::{Field, SHARPNESS, Slice};
+use grid::{Grid, Moves};
+
+/// Variants that [`variants`] lists at most.
+pub const VARIANTS_MAX: usize = 8;
+/// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
+const INFLATION_MAX: f64 = 1.25;
+/// Fewest slices of a flight.
+const SLICES_MIN: usize = 2;
+/// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
+const FREE: f64 = 1e-3;
+
+/// How coarsely to search, and for what flight time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant<T> {
+    /// Cells that a slice of time reaches, 3.5 to 4.5.
+    pub reach: T,
+    /// Factor on the speed, 1 to 1.25.
+    pub inflation: T,
+    /// Flight time, s.
+    pub duration: T,
+}
+
+/// What keeps a path from the goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Blocked {
+    /// A region, by index.
+    Region(usize),
+    /// A limit on a metric, by index.
+    Limit(usize),
+    /// The flight time: it is too short for the way.
+    Time,
+}
+
+/// What closes the way, and where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Obstruction<T, const DIM: usize> {
+    /// The constraint.
+    pub by: Blocked,
+    /// First blocked position of the path that crosses least of what is blocked, length units.
+    pub position: Point<T, DIM>,
+}
+
+/// How blocked cells are told from free ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Caution {
+    /// Regions grow by half a cell, and limits hold at the centre.
+    Careful,
+    /// Regions are as they are, and a limit that holds anywhere in the cell will do.
+    Bold,
+    /// Blocked cells can be crossed, at a price.
+    Through,
+}
+
+/// Memory of the search: room for `CELLS` cells, and for `PARENTS` entries, one a cell and inner slice.
+#[derive(Clone, Debug)]
+pub struct Lattice<T, const CELLS: usize, const PARENTS: usize> {
+    landscape: [T; CELLS],
+    cost: [T; CELLS],
+    next: [T; CELLS],
+    parents: [u8; PARENTS],
+    moves: Moves,
+}
+
+/// Grid, slices and reach of one search.
+#[derive(Clone, Copy, Debug)]
+struct Plan<T, const DIM: usize> {
+    grid: Grid<T, DIM>,
+    slices: usize,
+    /// Distance that one slice reaches, length units.
+    reach: T,
+    /// Length of a slice, s.
+    interval: T,
+}
+
+/// A few searches that differ in what a lattice gets wrong, and in flight time where that is free.
+#[must_use]
+pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<Variant<T>, VARIANTS_MAX> {
+    let frame = &scenario.frame;
+    let allowed = frame.time.max - frame.start_time;
+    let times = scenario.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
+    let shortest = times.fold(T::zero(), T::max);
+    let target = frame.time.target - frame.start_time;
+    let is_urged = frame.time.penalty > T::zero();
+    // With a penalty the best arrival is near the target, before or after it; without, anywhere up to the end.
+    let least = (shortest * T::real(1.02)).min(allowed);
+    let most = if is_urged { target.max(least).min(allowed) } else { allowed };
+    let at = |share: f64| least + (most - least) * T::real(share);
+    let late = |part: f64| (most * T::real(1.0 + part)).min(allowed);
+    let list = if is_urged {
+        [
+            (4.0, 1.12, at(1.0)),
+            (4.5, 1.25, at(1.0)),
+            (4.0, 1.12, late(0.03)),
+            (4.5, 1.25, late(0.06)),
+            (4.0, 1.12, at(0.5)),
+            (3.5, 1.0, late(0.01)),
+            (4.0, 1.12, late(0.06)),
+            (4.5, 1.25, at(0.2)),
+        ]
+    } else {
+        [
+            (4.0, 1.12, at(0.1)),
+            (4.0, 1.12, at(0.3)),
+            (4.0, 1.12, at(1.0)),
+            (4.5, 1.25, at(0.03)),
+            (4.0, 1.12, at(0.6)),
+            (4.5, 1.25, at(0.2)),
+            (3.5, 1.0, at(0.4)),
+            (4.5, 1.25, at(0.8)),
+        ]
+    };
+    let all = list.iter().map(|&(reach, inflation, duration)| Variant {
+        reach: T::real(reach),
+        inflation: T::real(inflation),
+        duration,
+    });
+    all.take(VARIANTS_MAX).collect()
+}
+
+/// Finds the cheapest lattice path of `agent` and writes it, at equal times, to its track in `trajectory`, with the
+/// variant's flight time; returns its estimated cost, the penalty on late arrival included.
+///
+/// `trajectory` must be of the scenario's size, with some path in every track: the other agents keep theirs, and that
+/// of `agent` is where worst-case terms start from. Levels of jamming and dropout are written too, as estimated.
+///
+/// # Errors
+/// Where there is no path, what closes the way. The path of `agent` is then not to be used.
+pub fn search<
+    T,
+    const DIM: usize,
+    const NODES: usize,
+    const AGENTS: usize,
+    const CELLS: usize,
+    const PARENTS: usize,
+>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+    agent: usize,
+    variant: &Variant<T>,
+    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    scratch: &mut [Sample<T, DIM>],
+) -> Result<T, Obstruction<T, DIM>>
+where
+    T: Real,
+{
+    let frame = &scenario.frame;
+    trajectory.set_duration(frame.start_time, variant.duration);
+    let has_extremes = scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme);
+    let passes = if has_extremes { SHARPNESS.len() } else { 1 };
+    let late = (frame.start_time + variant.duration - frame.time.target).max(T::zero());
+    let is_open = scenario.regions.is_empty() && scenario.limits.is_empty();
+    for caution in [Caution::Careful, Caution::Bold] {
+        let mut found = None;
+        for pass in 0..passes {
+            found = lattice.pass(scenario, trajectory, agent, (variant, caution, pass), scratch).ok();
+            if found.is_none() {
+                break;
+            }
+        }
+        if let Some(cost) = found {
+            return Ok(cost + frame.time.penalty * late * late);
+        }
+        if is_open {
+            break;
+        }
+    }
+    let position = scenario.agents.get(agent).map_or(Point::zeros(), |agent| agent.goal);
+    let out_of_time = Obstruction { by: Blocked::Time, position };
+    match lattice.pass(scenario, trajectory, agent, (variant, Caution::Through, 0), scratch) {
+        Ok(_) => Err(first_blocked(scenario, trajectory, agent, scratch).unwrap_or(out_of_time)),
+        Err(()) => Err(out_of_time),
+    }
+}
+
+/// The first blocked position along the path of `agent`.
+fn first_blocked<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    agent: usize,
+    scratch: &mut [Sample<T, DIM>],
+) -> Option<Obstruction<T, DIM>> {
+    let field = Field::new(scenario, trajectory, agent, 0, scratch)?;
+    let count = T::from_count(trajectory.intervals().max(1));
+    let path = &trajectory.tracks.get(agent)?.path;
+    for node in 1..trajectory.nodes() {
+        let slice = field.slice(T::from_count(node - 1) / count, T::from_count(node) / count);
+        let position = path.get(node)?;
+        if let Some(by) = field.blocked(&slice, position, T::zero(), scratch) {
+            return Some(Obstruction { by, position: *position });
+        }
+    }
+    None
+}
+
+impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, CELLS, PARENTS> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENTS> {
+    /// Empty memory.
+    #[must_use]
+    pub fn new() -> Self {
+        let zero = [T::zero(); CELLS];
+        Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none() }
+    }
+
+    /// One search; the path goes to the trajectory.
+    fn pass<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &mut self,
+        scenario: &View<'_, T, DIM>,
+        trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+        agent: usize,
+        (variant, caution, pass): (&Variant<T>, Caution, usize),
+        scratch: &mut [Sample<T, DIM>],
+    ) -> Result<T, ()> {
+        let field = Field::new(scenario, trajectory, agent, pass, scratch).ok_or(())?;
+        let plan = Plan::new(&field, variant, CELLS, PARENTS);
+        self.moves.collect(&plan.grid, plan.reach);
+        let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
+        let track = self.trace(&field, &plan, last, trajectory, scratch);
+        if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
+            *slot = track;
+        }
+        Ok(cost)
+    }
+
+    /// All slices; the least cost and the last cell of its path.
+    fn sweep<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &mut self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        caution: Caution,
+        scratch: &mut [Sample<T, DIM>],
+    ) -> Option<(T, usize)> {
+        let cells = plan.grid.cells();
+        let count = T::from_count(plan.slices);
+        let mut before: Option<Slice<T, DIM, AGENTS>> = None;
+        for number in 1..=plan.slices {
+            let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
+            if field.is_moving() || before.as_ref().is_none_or(|before| !slice.costs_as(before)) {
+                self.survey(field, plan, &slice, caution, scratch);
+            }
+            if number == plan.slices {
+                return self.arrive(field, plan, &slice, caution);
+            }
+            self.next.iter_mut().take(cells).for_each(|cost| *cost = T::INFINITY);
+            if number == 1 {
+                self.depart(field, plan, &slice, caution);
+            } else {
+                self.advance(field, plan, (number, &slice), caution);
+            }
+            core::mem::swap(&mut self.cost, &mut self.next);
+            before = Some(slice);
+        }
+        None
+    }
+
+    /// Running cost of every cell.
+    fn survey<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &mut self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        slice: &Slice<T, DIM, AGENTS>,
+        caution: Caution,
+        scratch: &mut [Sample<T, DIM>],
+    ) {
+        let margin = if caution == Caution::Careful { plan.grid.half_diagonal() } else { T::zero() };
+        let farthest = plan.reach * T::from_count(plan.slices);
+        for ((_, center), rate) in plan.grid.iter().zip(&mut self.landscape) {
+            let way = norm(&(center - field.agent.start)) + norm(&(field.agent.goal - center));
+            *rate = if way > farthest + plan.grid.size() {
+                T::INFINITY
+            } else if caution == Caution::Through {
+                if field.blocked(slice, &center, margin, scratch).is_some() { T::one() } else { T::real(FREE) }
+            } else {
+                field.best_rate(slice, (&center, &plan.grid.pitch), (caution, margin), scratch)
+            };
+        }
+        if caution == Caution::Through {
+            return;
+        }
+        for sensor in field.scenario.sensors {
+            let place = field.scenario.sensor_state(sensor, slice.time()).0;
+            let rate = self.landscape.get_mut(plan.grid.cell(&place));
+            if let Some(rate) = rate.filter(|rate| rate.finite() && plan.grid.holds(&place)) {
+                *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch));
+            }
+        }
+    }
+
+    /// Where a path that visits `cell` passes: its centre, or a sensor in it over which flying is cheaper.
+    fn waypoint<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        slice: &Slice<T, DIM, AGENTS>,
+        cell: usize,
+        scratch: &mut [Sample<T, DIM>],
+    ) -> Point<T, DIM> {
+        let center = plan.grid.center_of(cell);
+        let mut best = (field.rate(slice, &center, scratch), center);
+        for sensor in field.scenario.sensors {
+            let place = field.scenario.sensor_state(sensor, slice.time()).0;
+            if plan.grid.cell(&place) == cell && plan.grid.holds(&place) {
+                let rate = field.rate_across(slice, &place, &plan.grid.pitch, scratch);
+                if rate < best.0 {
+                    best = (rate, place);
+                }
+            }
+        }
+        best.1
+    }
+
+    /// The first slice: from the start itself.
+    fn depart<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &mut self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        slice: &Slice<T, DIM, AGENTS>,
+        caution: Caution,
+    ) {
+        let start = field.agent.start;
+        for (cell, (_, center)) in plan.grid.iter().enumerate() {
+            if norm(&(center - start)) <= plan.reach && is_clear(field, slice, (&start, &center), caution) {
+                let mean = self.mean_from(plan, &center, &start);
+                if let Some(cost) = self.next.get_mut(cell) {
+                    *cost = mean * plan.interval;
+                }
+            }
+        }
+    }
+
+    /// An inner slice: from cell to cell.
+    fn advance<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &mut self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        (number, slice): (usize, &Slice<T, DIM, AGENTS>),
+        caution: Caution,
+    ) {
+        let cells = plan.grid.cells();
+        let left = plan.reach * T::from_count(plan.slices - number);
+        let Some(parents) = self.parents.get_mut((number - 2) * cells..(number - 1) * cells) else {
+            return;
+        };
+        let Self { landscape, cost, next, moves, .. } = self;
+        let targets = plan.grid.iter().zip(next).zip(parents).enumerate();
+        for (to, (((at, center), best), parent)) in targets {
+            let is_free = landscape.get(to).is_some_and(|&rate| rate < T::INFINITY);
+            if !is_free || norm(&(field.agent.goal - center)) > left {
+                continue;
+            }
+            for (index, from, step) in moves.arriving(&plan.grid, (to, at)) {
+                let before = cost.get(from).copied().unwrap_or(T::INFINITY);
+                if before == T::INFINITY {
+                    continue;
+                }
+                let total = before + step.mean(landscape, from, to) * plan.interval;
+                if total < *best && is_clear(field, slice, (&plan.grid.center_of(from), &center), caution) {
+                    (*best, *parent) = (total, index);
+                }
+            }
+        }
+    }
+
+    /// The last slice: to the goal itself.
+    fn arrive<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        slice: &Slice<T, DIM, AGENTS>,
+        caution: Caution,
+    ) -> Option<(T, usize)> {
+        let goal = field.agent.goal;
+        let mut best = None;
+        for ((cell, (_, center)), &before) in plan.grid.iter().enumerate().zip(&self.cost) {
+            if before == T::INFINITY || norm(&(goal - center)) > plan.reach {
+                continue;
+            }
+            let total = before + self.mean_from(plan, &center, &goal) * plan.interval;
+            let is_better = best.is_none_or(|(least, _)| total < least) && total < T::INFINITY;
+            if is_better && is_clear(field, slice, (&center, &goal), caution) {
+                best = Some((total, cell));
+            }
+        }
+        best
+    }
+
+    /// Mean of the running cost from a cell's centre to an end of the path, whose own cell is left out: the end may
+    /// lie on the free side of it.
+    fn mean_from<const DIM: usize>(&self, plan: &Plan<T, DIM>, center: &Point<T, DIM>, end: &Point<T, DIM>) -> T {
+        let step = end - center;
+        let size = plan.grid.size();
+        let last = plan.grid.cell(end);
+        let mut samples = 1;
+        while T::from_count(samples) * size < norm(&step) && samples < grid::MOVES_MAX {
+            samples += 1;
+        }
+        let (mut sum, mut count) = (T::zero(), 0);
+        for sample in 0..=samples {
+            let cell = plan.grid.cell(&(center + step * (T::from_count(sample) / T::from_count(samples))));
+            if sample == 0 || cell != last {
+                sum += self.landscape.get(cell).copied().unwrap_or(T::INFINITY);
+                count += 1;
+            }
+        }
+        sum / T::from_count(count)
+    }
+
+    /// The path that ends in `last`, at the trajectory's nodes, with controls.
+    fn trace<const DIM: usize, const NODES: usize, const AGENTS: usize>(
+        &self,
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        plan: &Plan<T, DIM>,
+        last: usize,
+        trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+        scratch: &mut [Sample<T, DIM>],
+    ) -> Option<crate::trajectory::Track<T, DIM, NODES>> {
+        let mut track = *trajectory.tracks.get(field.index)?;
+        let cells = plan.grid.cells();
+        let intervals = T::from_count(trajectory.intervals().max(1));
+        let slices = T::from_count(plan.slices);
+        let (mut cell, mut end) = (last, field.agent.goal);
+        let mut node = trajectory.intervals();
+        for number in (1..=plan.slices).rev() {
+            let first = T::from_count(number - 1) / slices;
+            let slice = field.slice(first, T::from_count(number) / slices);
+            let from =
+                if number == 1 { field.agent.start } else { Self::waypoint(field, plan, &slice, cell, scratch) };
+            while node > 0 && T::from_count(node) / intervals > first {
+                let share = (T::from_count(node) / intervals - first) * slices;
+                let position = from + (end - from) * share.min(T::one());
+                *track.path.get_mut(node)? = position;
+                (*track.jam.get_mut(node)?, *track.azimuth.get_mut(node)?) =
+                    field.control(&slice, &position, scratch);
+                *track.dropout.get_mut(node)? = field.dropout();
+                node -= 1;
+            }
+            end = from;
+            if number > 2 {
+                let parent = self.parents.get((number - 3) * cells + cell).copied()?;
+                cell = self.moves.origin(parent, cell);
+            }
+        }
+        *track.path.first_mut()? = field.agent.start;
+        *track.path.get_mut(trajectory.intervals())? = field.agent.goal;
+        Some(track)
+    }
+}
+
+impl<T: Real, const DIM: usize> Plan<T, DIM> {
+    /// Lays the grid, and cuts the flight into slices that reach about the variant's number of cells.
+    fn new<const NODES: usize, const AGENTS: usize>(
+        field: &Field<'_, T, DIM, NODES, AGENTS>,
+        variant: &Variant<T>,
+        cells_max: usize,
+        parents_max: usize,
+    ) -> Self {
+        let agent = field.agent;
+        let domain = &field.scenario.frame.domain;
+        let length = agent.speed_max * variant.duration;
+        let far = length * T::real(INFLATION_MAX).max(variant.inflation);
+        let mut cells = cells_max;
+        loop {
+            let grid = Grid::new(domain, (&agent.start, &agent.goal), far, cells);
+            let wanted = length * variant.inflation / (grid.size() * variant.reach.max(T::one()));
+            let mut slices = SLICES_MIN;
+            // Never less than the variant's reach: a lattice that falls a little short of a whole cell loses it.
+            while T::from_count(slices + 1) <= wanted && slices < parents_max {
+                slices += 1;
+            }
+            if grid.cells() * (slices - SLICES_MIN) <= parents_max || cells <= 1 {
+                let count = T::from_count(slices);
+                return Self {
+                    grid,
+                    slices,
+                    reach: length * variant.inflation / count,
+                    interval: variant.duration / count,
+                };
+            }
+            cells -= (cells / 16).max(1);
+        }
+    }
+}
+
+/// Whether a move keeps out of all regions that are forbidden in the slice.
+fn is_clear<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    field: &Field<'_, T, DIM, NODES, AGENTS>,
+    slice: &Slice<T, DIM, AGENTS>,
+    (from, to): (&Point<T, DIM>, &Point<T, DIM>),
+    caution: Caution,
+) -> bool {
+    caution == Caution::Through
+        || field
+            .scenario
+            .regions
+            .iter()
+            .filter(|region| slice.meets(region))
+            .all(|region| region.clearance(&horizontal(from), &horizontal(to)).value >= T::zero())
+}
+
+#[cfg(test)]
+mod tests;

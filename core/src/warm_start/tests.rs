@@ -1,0 +1,256 @@
+use super::*;
+use crate::scenario::{
+    Agent, AgentSet, Detection, Domain, Draft, Knot, Limit, Metric, Motion, Pooling, Ranging, ReferencePoint, Region,
+    Scenario, Sense, Sensor, Shape, Side, Susceptibility, Term, Timing, Window,
+};
+use std::boxed::Box;
+use std::vec::Vec as List;
+
+type Place = Point<f64, 2>;
+type Path = Trajectory<f64, 2, 41, 1>;
+type Found = Result<f64, Obstruction<f64, 2>>;
+
+const JAM: Susceptibility<f64> =
+    Susceptibility { error_gain: 0.0, error_exponent: 2.0, detect_gain: 0.0, detect_exponent: 2.0 };
+
+fn sensor(motion: Motion<'_, f64, 2>) -> Sensor<'_, f64, 2> {
+    Sensor {
+        motion,
+        ranging: Some(Ranging::Toa { c1: 0.01, c2: 0.1, path_loss: 2.0 }),
+        detection: Some(Detection::Proxy { scale: 0.3, epsilon: 0.3, path_loss: 2.0 }),
+        jam: JAM,
+    }
+}
+
+fn region(x: f64, y: f64, radius: f64) -> Region<f64> {
+    let shape = Shape::Circle { center: Place::new(x, y), radius };
+    Region { shape, side: Side::Outside, window: Window::always() }
+}
+
+/// From (1, 5) to (9, 5) in a square of 10 at speed 0.1, in `duration` seconds.
+fn find(
+    sensors: &[Sensor<'_, f64, 2>],
+    (regions, limits): (&[Region<f64>], &[Limit<f64>]),
+    reduce: Reduce,
+    duration: f64,
+) -> (Path, Found) {
+    let agent = Agent {
+        start: Place::new(1.0, 5.0),
+        goal: Place::new(9.0, 5.0),
+        start_velocity: None,
+        speed_max: 0.1,
+        accel_max: 0.02,
+        weight: 1.0,
+        jammer: None,
+        dropout: None,
+    };
+    let term = Term {
+        metric: Metric::Detection,
+        sense: Sense::Minimize,
+        reduce,
+        weight: 1.0,
+        agents: AgentSet::ALL,
+        window: Window::always(),
+    };
+    let scenario = Scenario::<f64, 2, 32, 1, 8>::new(&Draft {
+        softening: 0.05,
+        reference_point: ReferencePoint::Current,
+        pooling: Pooling::None,
+        intervals: 40,
+        start_time: 0.0,
+        time: Timing { max: 400.0, target: 400.0, penalty: 0.0 },
+        domain: Domain { min: Place::new(0.0, 0.0), max: Place::new(10.0, 10.0) },
+        agents: &[agent],
+        sensors,
+        terms: &[term],
+        separation: None,
+        regions,
+        limits,
+    })
+    .unwrap();
+    let view = scenario.view();
+    let mut path = Path::straight(&view, duration).unwrap();
+    let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
+    let mut scratch = [Sample::default(); 32];
+    let variant = Variant { reach: 4.0, inflation: 1.12, duration };
+    let found = search(&view, &mut path, 0, &variant, &mut lattice, &mut scratch);
+    (path, found)
+}
+
+fn nodes(path: &Path) -> &[Place] {
+    &path.tracks[0].path[..path.nodes()]
+}
+
+/// A column of sensors at x = 5 from `low` to `high`.
+fn wall(low: f64, high: f64) -> List<Sensor<'static, f64, 2>> {
+    let count = ((high - low) / 0.5) as usize;
+    (0..=count).map(|index| sensor(Motion::Fixed(Place::new(5.0, low + 0.5 * index as f64)))).collect()
+}
+
+#[test]
+fn goes_around_a_wall_of_sensors() {
+    for reduce in [Reduce::Integral, Reduce::Extreme] {
+        let (path, found) = find(&wall(2.0, 10.0), (&[], &[]), reduce, 140.0);
+        assert!(found.is_ok(), "{found:?}");
+        let crossing = nodes(&path).iter().find(|place| place[0] > 5.0).unwrap();
+        assert!(crossing[1] < 1.2, "{reduce:?}: crosses at {crossing}");
+        assert_eq!((nodes(&path)[0], nodes(&path)[40]), (Place::new(1.0, 5.0), Place::new(9.0, 5.0)));
+    }
+}
+
+#[test]
+fn estimates_what_the_path_costs() {
+    let (path, found) = find(&wall(2.0, 10.0), (&[], &[]), Reduce::Integral, 140.0);
+    let sensors = wall(2.0, 10.0);
+    let cost: f64 = nodes(&path)[1..]
+        .iter()
+        .map(|place| {
+            let missed: f64 = sensors
+                .iter()
+                .map(|sensor| {
+                    let Motion::Fixed(at) = sensor.motion else { return 1.0 };
+                    1.0 - (0.3 / (0.3 + crate::math::norm_squared(&(place - at)) + 0.0025)).min(1.0)
+                })
+                .product();
+            (1.0 - missed) * 140.0 / 40.0
+        })
+        .sum();
+    let estimate = found.unwrap();
+    assert!((estimate - cost).abs() < 0.05 * cost, "{estimate} for {cost}");
+}
+
+#[test]
+fn keeps_out_of_a_region() {
+    let across = region(5.0, 5.5, 2.0);
+    let (path, found) =
+        find(&[sensor(Motion::Fixed(Place::new(5.0, 1.0)))], (&[across], &[]), Reduce::Integral, 120.0);
+    assert!(found.is_ok(), "{found:?}");
+    let excess = crate::constraints::region::excess(&across, &path.times[..41], nodes(&path)).amount;
+    // Nodes cut the corners of the lattice path by little.
+    assert!(excess < 0.05, "{excess}");
+    assert!(nodes(&path).iter().any(|place| (place[1] - 5.0).abs() > 1.4));
+}
+
+#[test]
+fn names_the_region_that_closes_the_way() {
+    let closed = [region(2.0, 9.0, 0.5), region(5.0, 2.0, 2.2), region(5.0, 5.0, 1.4), region(5.0, 8.2, 2.2)];
+    let (_, found) = find(&[sensor(Motion::Fixed(Place::new(5.0, 1.0)))], (&closed, &[]), Reduce::Integral, 160.0);
+    let obstruction = found.unwrap_err();
+    assert!(matches!(obstruction.by, Blocked::Region(1..=3)), "{obstruction:?}");
+    assert!((obstruction.position[0] - 5.0).abs() < 2.2, "{obstruction:?}");
+}
+
+#[test]
+fn names_the_limit_that_closes_the_way() {
+    let limit = Limit { metric: Metric::Detection, min: None, max: Some(0.5) };
+    let (_, found) = find(&wall(0.0, 10.0), (&[], &[limit]), Reduce::Integral, 160.0);
+    let obstruction = found.unwrap_err();
+    assert_eq!(obstruction.by, Blocked::Limit(0));
+    assert!((obstruction.position[0] - 5.0).abs() < 2.0, "{obstruction:?}");
+}
+
+#[test]
+fn a_limit_that_leaves_a_gap_sends_the_path_there() {
+    let limit = Limit { metric: Metric::Detection, min: None, max: Some(0.5) };
+    let (path, found) = find(&wall(3.0, 10.0), (&[], &[limit]), Reduce::Integral, 160.0);
+    assert!(found.is_ok(), "{found:?}");
+    let crossing = nodes(&path).iter().find(|place| place[0] > 5.0).unwrap();
+    assert!(crossing[1] < 2.2, "crosses at {crossing}");
+}
+
+#[test]
+fn says_that_time_is_too_short() {
+    let across = region(5.0, 5.0, 3.0);
+    let (_, found) = find(&[sensor(Motion::Fixed(Place::new(5.0, 1.0)))], (&[across], &[]), Reduce::Integral, 82.0);
+    let obstruction = found.unwrap_err();
+    assert_eq!(obstruction.by, Blocked::Region(0), "{obstruction:?}");
+    let (_, found) = find(&[sensor(Motion::Fixed(Place::new(5.0, 1.0)))], (&[], &[]), Reduce::Integral, 60.0);
+    assert_eq!(found.unwrap_err().by, Blocked::Time);
+}
+
+#[test]
+fn gives_way_to_a_moving_sensor_when_it_comes() {
+    // It crosses the straight line at x = 5 when the agent is there, from south to north, or the other way.
+    for (from, to) in [(1.0, 9.0), (9.0, 1.0)] {
+        let track = [
+            Knot { time: 0.0, position: Place::new(5.0, from) },
+            Knot { time: 110.0, position: Place::new(5.0, to) },
+        ];
+        let (path, found) = find(&[sensor(Motion::Track(&track))], (&[], &[]), Reduce::Integral, 110.0);
+        assert!(found.is_ok(), "{found:?}");
+        let closest = nodes(&path)
+            .iter()
+            .zip(&path.times)
+            .map(|(place, time)| norm(&(place - Place::new(5.0, from + (to - from) * time / 110.0))))
+            .fold(f64::INFINITY, f64::min);
+        assert!(closest > 2.0, "closest {closest}");
+    }
+}
+
+#[test]
+fn finds_its_way_in_three_dimensions() {
+    let agent = Agent {
+        start: Point::<f64, 3>::new(1.0, 5.0, 0.3),
+        goal: Point::<f64, 3>::new(9.0, 5.0, 0.3),
+        start_velocity: None,
+        speed_max: 0.1,
+        accel_max: 0.02,
+        weight: 1.0,
+        jammer: None,
+        dropout: None,
+    };
+    let term = Term {
+        metric: Metric::Detection,
+        sense: Sense::Minimize,
+        reduce: Reduce::Integral,
+        weight: 1.0,
+        agents: AgentSet::ALL,
+        window: Window::always(),
+    };
+    let below = Sensor {
+        motion: Motion::Fixed(Point::<f64, 3>::new(5.0, 5.0, 0.0)),
+        ranging: None,
+        detection: Some(Detection::Proxy { scale: 0.3, epsilon: 0.3, path_loss: 2.0 }),
+        jam: JAM,
+    };
+    let scenario = Scenario::<f64, 3, 4, 1, 0>::new(&Draft {
+        softening: 0.05,
+        reference_point: ReferencePoint::Current,
+        pooling: Pooling::None,
+        intervals: 40,
+        start_time: 0.0,
+        time: Timing { max: 400.0, target: 400.0, penalty: 0.0 },
+        domain: Domain { min: Point::<f64, 3>::new(0.0, 4.9, 0.0), max: Point::<f64, 3>::new(10.0, 5.1, 3.0) },
+        agents: &[agent],
+        sensors: &[below],
+        terms: &[term],
+        separation: None,
+        regions: &[],
+        limits: &[],
+    })
+    .unwrap();
+    let view = scenario.view();
+    let mut path = Trajectory::<f64, 3, 41, 1>::straight(&view, 110.0).unwrap();
+    let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
+    let mut scratch = [Sample::default(); 4];
+    let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0 };
+    search(&view, &mut path, 0, &variant, &mut lattice, &mut scratch).unwrap();
+    // The domain is a sheet: over it is the only way around.
+    let highest = path.tracks[0].path[..41].iter().map(|place| place[2]).fold(0.0, f64::max);
+    assert!(highest > 1.5, "highest {highest}");
+}
+
+/// In three dimensions there are more moves within reach than the list holds.
+#[test]
+fn a_full_list_of_moves_is_walked_to_its_end() {
+    let corner = Point::<f64, 3>::new(10.0, 10.0, 10.0);
+    let domain = Domain { min: Point::zeros(), max: corner };
+    let grid = grid::Grid::new(&domain, (&Point::zeros(), &corner), 30.0, 1024);
+    let mut moves = grid::Moves::none();
+    moves.collect(&grid, 10.0 * grid.size());
+    let middle = grid.cell(&(corner * 0.5));
+    let (at, _) = grid.iter().nth(middle).expect("a cell of the grid");
+    let numbers: List<usize> = moves.arriving(&grid, (middle, at)).map(|(number, ..)| usize::from(number)).collect();
+    assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]), "{numbers:?}");
+    assert!(numbers.last().is_some_and(|last| *last > 200), "{numbers:?}");
+}

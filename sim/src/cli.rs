@@ -1,0 +1,236 @@
+//! The command line: what can be asked, and how each command is explained.
+
+use std::path::PathBuf;
+
+use clap::builder::styling::{AnsiColor, Styles};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::trade::{Amount, Over};
+
+const STYLES: Styles = Styles::styled()
+    .header(AnsiColor::Green.on_default().bold())
+    .usage(AnsiColor::Green.on_default().bold())
+    .literal(AnsiColor::Cyan.on_default().bold())
+    .placeholder(AnsiColor::Cyan.on_default());
+
+const AFTER: &str = "\
+Without a command, the built-in scenario `square8-detection` is planned into the folder `out`.
+
+Exit status: 0 done, 1 the plan is not feasible, 2 bad input or usage.
+
+Example:
+  quietpath new scenario.toml && quietpath plan scenario.toml --out out";
+
+/// Plans how UAVs fly between known radio sensors so that they are detected least, or located worst.
+#[derive(Debug, Parser)]
+#[command(name = "quietpath", version, styles = STYLES, after_help = AFTER)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What can be asked.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Plan a flight; print a summary, write the plan, pictures and mission files
+    #[command(after_help = "\
+Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
+
+Example:
+  quietpath plan scenario.toml --out out")]
+    Plan(PlanArgs),
+    /// Plan over a range of deadlines or budgets, and draw what each buys
+    #[command(after_help = "\
+Values have units: 105% of the shortest flight time (deadline) or of the flight's time (budgets), 18.7s; plain numbers
+are multiples of the shortest flight time for a deadline, and seconds for budgets. Without values, a deadline goes from
+100% to 130%, and a budget from 0 to the scenario's own. More never gives a worse plan: every plan is also tried as a
+start for its neighbours. Scenarios with `[rolling]` are planned in one piece.
+
+Exit status: 0 planned, 1 a plan is not feasible, 2 bad input.
+
+Example:
+  quietpath trade scenario.toml --over deadline --values 100%,105%,110%,115% --out trade")]
+    Trade(TradeArgs),
+    /// Draw a metric over the area
+    #[command(after_help = "\
+Pictures are in metres; the outermost percent of values at either end share a colour.
+A CSV has the columns x, y (z, where a flight has three dimensions) and the metric,
+at the centres of the cells and in the scenario's units.
+
+Example:
+  quietpath landscape scenario.toml --metric log_aee --out landscape.png --out landscape.csv")]
+    Landscape(LandscapeArgs),
+    /// Recompute the objective and the violations of a plan
+    #[command(after_help = "\
+Exit status: 0 feasible, 1 not feasible, 2 bad input.
+
+Example:
+  quietpath check scenario.toml out/plan.json")]
+    Check(CheckArgs),
+    /// Write a commented scenario to start from
+    #[command(after_help = "\
+Example:
+  quietpath new scenario.toml")]
+    New(NewArgs),
+    /// Print the completions of a shell
+    #[command(after_help = "\
+Example:
+  quietpath completions bash > quietpath.bash")]
+    Completions(CompletionsArgs),
+}
+
+/// Arguments of `quietpath plan`.
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// Folder for plan.json, pictures and mission files; made where it is missing
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// File for the plan alone; `-` writes it to standard output and the summary to standard error
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<PathBuf>,
+    /// Numbers that the planner computes with
+    #[arg(long, value_enum, default_value_t = PrecisionArg::F64)]
+    pub precision: PrecisionArg,
+    /// Metric behind the flight in the landscape [default: that of the first objective term]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub metric: Option<MetricArg>,
+    /// Plan a scenario with `[rolling]` in one piece, every track known
+    #[arg(long)]
+    pub once: bool,
+}
+
+/// Arguments of `quietpath trade`.
+#[derive(Debug, Args)]
+pub struct TradeArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// What to sweep
+    #[arg(long, value_enum)]
+    pub over: Over,
+    /// First value
+    #[arg(long, value_name = "VALUE")]
+    pub from: Option<Amount>,
+    /// Last value
+    #[arg(long, value_name = "VALUE")]
+    pub to: Option<Amount>,
+    /// Number of values from first to last [default: 6]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=64))]
+    pub points: Option<u8>,
+    /// The values one by one, separated by commas
+    #[arg(long, value_name = "VALUES", value_delimiter = ',', conflicts_with_all = ["from", "to", "points"])]
+    pub values: Vec<Amount>,
+    /// Metric of the landscape and of the first curves [default: that of the first objective term]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub metric: Option<MetricArg>,
+    /// Folder for pictures, figures and plans; made where it is missing
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// Arguments of `quietpath landscape`.
+#[derive(Debug, Args)]
+pub struct LandscapeArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// Metric to draw
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub metric: MetricArg,
+    /// Instant of the picture, in seconds, where sensors move [default: the start time]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub time: Option<f64>,
+    /// Height of the picture in a flight in three dimensions, in length units [default: that of the first start]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    pub height: Option<f64>,
+    /// Cells along the longer side
+    #[arg(long, value_name = "N", default_value_t = 240, value_parser = clap::value_parser!(u16).range(2..=2000))]
+    pub resolution: u16,
+    /// File to write: .png, .svg or .csv, or `-` for CSV on standard output; may be repeated
+    #[arg(long, value_name = "FILE", default_value = "landscape.png")]
+    pub out: Vec<PathBuf>,
+}
+
+/// Arguments of `quietpath check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// Plan file; `-` reads it from standard input
+    pub plan: String,
+}
+
+/// Arguments of `quietpath new`.
+#[derive(Debug, Args)]
+pub struct NewArgs {
+    /// File to write; `-` for standard output
+    #[arg(default_value = "scenario.toml")]
+    pub file: PathBuf,
+    /// Overwrite a file that exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Arguments of `quietpath completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// Shell to complete for
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// Floating-point format, as the command line names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PrecisionArg {
+    /// 32 bits, as small microcontrollers compute
+    F32,
+    /// 64 bits
+    F64,
+}
+
+/// Metric, by the names of scenario files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MetricArg(pub quietpath_core::scenario::Metric);
+
+impl ValueEnum for MetricArg {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [MetricArg; 10] = {
+            let mut all = [MetricArg(quietpath_core::scenario::Metric::Detection); 10];
+            let mut index = 0;
+            while index < all.len() {
+                all[index] = MetricArg(quietpath_core::scenario::Metric::ALL[index]);
+                index += 1;
+            }
+            all
+        };
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<clap::builder::PossibleValue> {
+        Some(clap::builder::PossibleValue::new(self.0.name()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_help_of_every_command_ends_with_an_example() {
+        let command = Cli::command();
+        for command in command.get_subcommands().chain([&command]) {
+            let help = command.clone().render_long_help().to_string();
+            let last = help.trim_end().lines().rev().take(2).collect::<Vec<_>>();
+            assert_eq!(last[1], "Example:", "{help}");
+            assert!(last[0].starts_with("  quietpath "), "{help}");
+        }
+    }
+}

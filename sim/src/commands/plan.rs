@@ -1,0 +1,171 @@
+//! `quietpath plan`: from a scenario to a plan, a summary, pictures and mission files.
+//!
+//! | file in `--out` | what |
+//! |---|---|
+//! | `plan.json` | the plan |
+//! | `landscape.svg`, `.png` | a metric over the area, the flight on it |
+//! | `series.svg`, `.png` | every figure along the flight |
+//! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
+//! | `path.geojson` | for maps; with latitude and longitude only |
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use quietpath_bridge::file::mission::{file_name, missions};
+use quietpath_bridge::file::{ScenarioFile, geojson};
+use quietpath_bridge::planning::{self, Options, Planned, Precision, Rollout};
+use quietpath_core::scenario::Metric;
+
+use super::{landscape, load};
+use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
+use crate::illustrate::{self, Flown};
+use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
+use crate::report;
+
+/// The scenario that is planned when nothing is asked.
+pub const BUILT_IN: &str = include_str!("../../scenarios/square8-detection.toml");
+/// Where its files go.
+const BUILT_IN_OUT: &str = "out";
+/// Cells along the longer side of the landscape behind a flight.
+const CELLS: usize = 240;
+
+/// Plans a scenario file.
+///
+/// # Errors
+/// Bad input, a scenario that this version does not plan, files that cannot be written.
+pub fn run(args: &PlanArgs) -> Result<Verdict, Failure> {
+    let scenario = load(&args.scenario)?;
+    carry_out(&scenario, args)
+}
+
+/// Plans the built-in scenario into the folder `out`.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn built_in() -> Result<Verdict, Failure> {
+    let scenario = ScenarioFile::parse("built-in scenario", BUILT_IN)?.scenario;
+    let args = PlanArgs {
+        scenario: String::new(),
+        out: Some(PathBuf::from(BUILT_IN_OUT)),
+        plan: None,
+        precision: PrecisionArg::F64,
+        metric: None,
+        once: false,
+    };
+    say(Stream::Out, "Planning the built-in scenario; `quietpath --help` tells what else there is.\n\n")?;
+    carry_out(&scenario, &args)
+}
+
+fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failure> {
+    // Before the planning, so that a folder that cannot be written costs no time.
+    if let Some(folder) = &args.out {
+        std::fs::create_dir_all(folder)
+            .map_err(|cause| Failure::Input(format!("cannot make the folder {}: {cause}", folder.display())))?;
+    }
+    let metric = background(scenario, args.metric)?;
+    let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
+    let Planned { plan, assessment, .. } = planned;
+    let json_to_stdout = args.plan.as_deref() == Some(Path::new("-"));
+    let summary_to = if json_to_stdout { Stream::Err } else { Stream::Out };
+    match &args.plan {
+        Some(_) if json_to_stdout => say(Stream::Out, &plan.to_json())?,
+        Some(file) => write_file(file, plan.to_json().as_bytes())?,
+        None => {}
+    }
+    let mut text = report::summary(scenario, &plan, &assessment);
+    if let Some(folder) = &args.out {
+        let flown = Flown { plan: &plan, assessment: &assessment };
+        let written = with_progress("drawing", || write_folder(scenario, flown, metric, folder))?;
+        text.push_str(&list(folder, &written));
+    }
+    say(summary_to, &text)?;
+    Ok(Verdict::on(assessment.feasible))
+}
+
+fn options(args: &PlanArgs) -> Options {
+    let precision = match args.precision {
+        PrecisionArg::F32 => Precision::F32,
+        PrecisionArg::F64 => Precision::F64,
+    };
+    let rollout = if args.once { Rollout::Once } else { Rollout::AsWritten };
+    Options { precision, rollout, ..Options::default() }
+}
+
+/// The metric behind the flight: asked for, or that of the first term of the objective.
+pub(super) fn background(scenario: &ScenarioFile, asked: Option<MetricArg>) -> Result<Metric, Failure> {
+    let first = scenario.terms.first().map_or(Metric::Detection, |term| term.metric);
+    let metric = asked.map_or(first, |asked| asked.0);
+    let ranging = scenario.sensors.iter().filter(|sensor| sensor.ranging.is_some()).count();
+    if metric.is_location_error() && ranging <= scenario.dimension {
+        return Err(Failure::Input(format!(
+            "--metric {} needs at least {} sensors with `ranging`, and the scenario has {ranging}",
+            metric.name(),
+            scenario.dimension + 1
+        )));
+    }
+    Ok(metric)
+}
+
+/// What was written into a folder, and what was not and why.
+struct Written {
+    files: Vec<String>,
+    skipped: Option<String>,
+}
+
+fn write_folder(
+    scenario: &ScenarioFile,
+    flown: Flown<'_>,
+    metric: Metric,
+    folder: &Path,
+) -> Result<Written, Failure> {
+    let mut files = Vec::new();
+    let mut put = |name: String, bytes: &[u8]| -> Result<(), Failure> {
+        write_file(&folder.join(&name), bytes)?;
+        files.push(name);
+        Ok(())
+    };
+    put("plan.json".into(), flown.plan.to_json().as_bytes())?;
+    let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
+    let pictures = [
+        ("landscape", illustrate::landscape(scenario, &grid, Some(flown.plan)).map_err(Failure::input)?),
+        ("series", illustrate::series(scenario, flown)),
+    ];
+    for (name, picture) in &pictures {
+        put(format!("{name}.png"), &picture.png().map_err(Failure::input)?)?;
+        put(format!("{name}.svg"), picture.svg().as_bytes())?;
+    }
+    let mut skipped = None;
+    if scenario.frame.origin.is_none() {
+        skipped = Some("no mission files: the scenario has no frame.latitude_deg and frame.longitude_deg".into());
+    } else {
+        put("path.geojson".into(), geojson::to_geojson(scenario, flown.plan)?.as_bytes())?;
+        match missions(scenario, flown.plan) {
+            Ok(missions) => {
+                for mission in &missions {
+                    let name = |extension| file_name(&mission.agent, missions.len(), extension);
+                    put(name("plan"), mission.to_qgc_plan().as_bytes())?;
+                    put(name("waypoints"), mission.to_waypoints().as_bytes())?;
+                }
+            }
+            Err(cause) => skipped = Some(format!("no mission files: {cause}")),
+        }
+    }
+    Ok(Written { files, skipped })
+}
+
+fn list(folder: &Path, written: &Written) -> String {
+    let mut text = String::new();
+    let pictures = |name: &&String| {
+        Path::new(name.as_str()).extension().is_some_and(|extension| extension == "png" || extension == "svg")
+    };
+    for (title, wanted) in [("pictures", true), ("other files", false)] {
+        let _ = writeln!(text, "\n{title}");
+        for name in written.files.iter().filter(|name| pictures(name) == wanted) {
+            let _ = writeln!(text, "  {}", folder.join(name).display());
+        }
+    }
+    if let Some(reason) = &written.skipped {
+        let _ = writeln!(text, "\nnote: {reason}");
+    }
+    text
+}

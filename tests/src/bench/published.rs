@@ -1,0 +1,282 @@
+//! Every scenario of the program against the best known plan, and against the peers in the same run.
+//!
+//! A scenario's turns are interleaved: ours, then each peer, then ours again, so that what else the machine does
+//! falls on all. Each peer is first tried in every variant it has; the fastest that ends in a feasible plan takes the
+//! turns. Times are medians over the turns.
+
+use std::fmt::Write as _;
+
+use quietpath_bridge::file::ScenarioFile;
+use quietpath_bridge::planning::{Options, Planned, Rollout, plan};
+
+use super::figure::{gap, median};
+use super::peer::{Answer, Peer};
+use super::{machine, page};
+use crate::figures::{Reference, references};
+use crate::{repository, scenario_path};
+
+/// How to measure.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Turns of each solver.
+    pub turns: usize,
+    /// Part of the names of the scenarios to take; empty for all.
+    pub only: String,
+}
+
+/// One solver's row.
+struct Row {
+    name: String,
+    reference: Option<Reference>,
+    ours: Result<(Planned, f64), String>,
+    /// In the order of the peers.
+    peers: Vec<Result<Timed, String>>,
+}
+
+/// A peer's answer in its fastest variant.
+struct Timed {
+    variant: String,
+    answer: Answer,
+    seconds: f64,
+}
+
+/// Measures, prints, and writes the section.
+///
+/// # Errors
+/// The page cannot be written.
+pub fn run(request: &Request) -> std::io::Result<()> {
+    let mut peers: Vec<(&str, Peer)> = Vec::new();
+    let mut missing = Vec::new();
+    for (name, peer) in [("IPOPT", Peer::ipopt()), ("OpEn", Peer::open())] {
+        match peer {
+            Ok(peer) => peers.push((name, peer)),
+            Err(error) => {
+                println!("without {name}: {error}");
+                missing.push(name);
+            }
+        }
+    }
+    let opening = machine::described();
+    let mut references = references();
+    let mut rows = Vec::new();
+    for name in names().into_iter().filter(|name| name.contains(&request.only)) {
+        let row = measure(&name, references.remove(&name), &mut peers, request.turns);
+        println!("{}", line(&row));
+        rows.push(row);
+    }
+    let labels: Vec<(&str, String)> = peers.iter().map(|(name, peer)| (*name, peer.versions.clone())).collect();
+    let body = section(&opening, &rows, &labels, &missing, request.turns);
+    println!("\n{body}");
+    if request.only.is_empty() { page::write("Published scenarios", &body) } else { Ok(()) }
+}
+
+/// Names of the scenarios that come with the program.
+///
+/// # Panics
+/// The folder of the scenarios is not there.
+#[must_use]
+pub fn names() -> Vec<String> {
+    let folder = repository().join("sim/scenarios");
+    let files = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let stem = |file: std::fs::DirEntry| Some(file.path().file_stem()?.to_string_lossy().into_owned());
+    let mut names: Vec<String> = files.flatten().filter_map(stem).collect();
+    names.sort();
+    names
+}
+
+/// The plan of a scenario with default settings, in one piece.
+pub(super) fn ours(scenario: &ScenarioFile) -> Result<(Planned, f64), String> {
+    let options = Options { rollout: Rollout::Once, ..Options::default() };
+    let planned = plan(scenario, &options).map_err(|error| error.to_string())?;
+    let seconds = planned.plan.timing.map_or(f64::NAN, |timing| timing.plan_seconds);
+    Ok((planned, seconds))
+}
+
+fn measure(name: &str, reference: Option<Reference>, peers: &mut [(&str, Peer)], turns: usize) -> Row {
+    let path = scenario_path(name);
+    let scenario = crate::scenario(name);
+    let mut best: Vec<Result<Timed, String>> = Vec::new();
+    for (_, peer) in peers.iter_mut() {
+        best.push(fastest(peer, &scenario, &path));
+    }
+    let mut times = vec![Vec::new(); peers.len()];
+    let (mut own, mut ours_times) = (ours(&scenario), Vec::new());
+    for _ in 0..turns {
+        own = ours(&scenario);
+        ours_times.extend(own.as_ref().map(|(_, seconds)| *seconds).ok());
+        for (((_, peer), found), times) in peers.iter_mut().zip(&best).zip(&mut times) {
+            if let Ok(found) = found {
+                let answer = peer.solve(&scenario, &path, &found.variant);
+                times.extend(answer.map(|answer| answer.seconds).unwrap_or_default());
+            }
+        }
+    }
+    for (found, times) in best.iter_mut().zip(&times) {
+        if let Ok(found) = found {
+            found.seconds = median(times);
+        }
+    }
+    if let Ok((_, seconds)) = &mut own {
+        *seconds = median(&ours_times);
+    }
+    Row { name: name.to_owned(), reference, ours: own, peers: best }
+}
+
+/// The variant that takes least time, of those that end in a feasible plan where there are any. The first solve of a
+/// variant warms it up.
+fn fastest(peer: &mut Peer, scenario: &ScenarioFile, path: &std::path::Path) -> Result<Timed, String> {
+    let mut all = Vec::new();
+    for variant in peer.variants.clone() {
+        peer.solve(scenario, path, &variant)?;
+        let answer = peer.solve(scenario, path, &variant)?;
+        let seconds = median(&answer.seconds);
+        all.push(Timed { variant, answer, seconds });
+    }
+    all.sort_by(|a, b| {
+        (!a.answer.is_feasible, a.seconds)
+            .partial_cmp(&(!b.answer.is_feasible, b.seconds))
+            .expect("times are numbers")
+    });
+    all.into_iter().next().ok_or_else(|| "has no variants".into())
+}
+
+fn line(row: &Row) -> String {
+    match &row.ours {
+        Ok((planned, seconds)) => {
+            let best = row.reference.as_ref().map_or(f64::NAN, |reference| reference.objective);
+            let objective = planned.assessment.objective;
+            let mut text = format!(
+                "{:24} {objective:13.6} gap {:+9.2e} {:15} {:8.1} ms",
+                row.name,
+                gap(objective, best),
+                planned.status.name(),
+                1e3 * seconds
+            );
+            for timed in row.peers.iter().flatten() {
+                let _ = write!(
+                    text,
+                    "  {} {:8.1} ms ({:.1}x)",
+                    timed.variant,
+                    1e3 * timed.seconds,
+                    timed.seconds / seconds
+                );
+            }
+            text
+        }
+        Err(error) => format!("{:24} {}", row.name, error.lines().next().unwrap_or_default()),
+    }
+}
+
+fn section(opening: &str, rows: &[Row], peers: &[(&str, String)], missing: &[&str], turns: usize) -> String {
+    let mut text = format!("{opening} Median of {turns} turns, interleaved, one thread each.\n");
+    for (name, versions) in peers {
+        let _ = writeln!(text, "{name}: {versions}.");
+    }
+    for name in missing {
+        let _ = writeln!(text, "{name} could not be had, and is left out.");
+    }
+    text.push_str(
+        "\n| scenario | objective | best known | gap | status | iterations | feasible | ms |\n\
+         |---|---:|---:|---:|---|---:|---|---:|\n",
+    );
+    for row in rows {
+        let _ = writeln!(text, "{}", own_cells(row));
+    }
+    let gaps: Vec<f64> = rows.iter().filter_map(own_gap).collect();
+    let below = gaps.iter().filter(|gap| **gap < 0.0).count();
+    let _ = writeln!(
+        text,
+        "\nGap: median {:+.1e}, worst {:+.1e}; {below} of {} below zero, {} above 1e-3.",
+        median(&gaps),
+        gaps.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        gaps.len(),
+        gaps.iter().filter(|gap| **gap > 1e-3).count()
+    );
+    for (index, (name, _)) in peers.iter().enumerate() {
+        text.push_str(&peer_table(rows, index, name));
+    }
+    text
+}
+
+fn own_gap(row: &Row) -> Option<f64> {
+    let objective = row.ours.as_ref().ok()?.0.assessment.objective;
+    Some(gap(objective, row.reference.as_ref()?.objective))
+}
+
+fn own_cells(row: &Row) -> String {
+    let best =
+        row.reference.as_ref().map_or_else(|| "none".into(), |reference| format!("{:.6}", reference.objective));
+    let (planned, seconds) = match &row.ours {
+        Ok(found) => found,
+        Err(error) => {
+            return format!("| {} | | {best} | | {} | | no | |", row.name, error.lines().next().unwrap_or_default());
+        }
+    };
+    let gap = own_gap(row).map_or_else(String::new, |gap| format!("{gap:+.1e}"));
+    let feasible = if planned.assessment.feasible { "yes" } else { "**no**" };
+    format!(
+        "| {} | {:.6} | {best} | {gap} | {} | {} | {feasible} | {:.1} |",
+        row.name,
+        planned.assessment.objective,
+        planned.status.name(),
+        planned.iterations,
+        1e3 * seconds
+    )
+}
+
+fn peer_table(rows: &[Row], index: usize, name: &str) -> String {
+    let mut text = format!(
+        "\n### {name} from the straight line\nTime ratio: theirs over ours, so that large is good for us. Gap: theirs to ours, so that \
+         positive is good for us.\nThe variant is the fastest; building the problem is not part of the time.\n\n\
+         | scenario | variant | ms | ratio | objective | gap | feasible | iterations | build ms | wins |\n\
+         |---|---|---:|---:|---:|---:|---|---:|---:|---|\n"
+    );
+    let (mut ratios, mut wins) = (Vec::new(), Vec::new());
+    for row in rows {
+        let (Ok((planned, seconds)), Some(found)) = (&row.ours, row.peers.get(index)) else { continue };
+        let timed = match found {
+            Ok(timed) => timed,
+            Err(error) => {
+                let _ =
+                    writeln!(text, "| {} | {} | | | | | | | | |", row.name, error.lines().next().unwrap_or_default());
+                continue;
+            }
+        };
+        let (ratio, answer) = (timed.seconds / seconds, &timed.answer);
+        let behind = gap(answer.objective, planned.assessment.objective);
+        let mut won = Vec::new();
+        if answer.is_feasible && ratio < 1.0 {
+            won.push("time");
+        }
+        // Less than the planners' own tolerances is no win.
+        if answer.is_feasible && behind < -1e-5 {
+            won.push("objective");
+        }
+        if answer.is_feasible {
+            ratios.push(ratio);
+        }
+        let _ = writeln!(
+            text,
+            "| {} | {} | {:.1} | {ratio:.1} | {:.6} | {behind:+.1e} | {} | {} | {:.0} | {} |",
+            row.name,
+            timed.variant,
+            1e3 * timed.seconds,
+            answer.objective,
+            if answer.is_feasible { "yes" } else { "no" },
+            answer.iterations,
+            1e3 * answer.build_seconds,
+            won.join(", ")
+        );
+        if !won.is_empty() {
+            wins.push(format!("{} ({})", row.name, won.join(", ")));
+        }
+    }
+    let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    let listed = if wins.is_empty() { "nowhere".into() } else { wins.join("; ") };
+    let _ = writeln!(
+        text,
+        "\nRatio where {name}'s plan is feasible: median {:.1}, least {least:.1}. {name} wins: {listed}.",
+        median(&ratios)
+    );
+    text
+}

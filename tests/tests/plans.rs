@@ -1,0 +1,108 @@
+//! Scenarios are planned feasibly, with claims that hold, and as well as the reference.
+
+use quietpath_bridge::file::PlanFile;
+use quietpath_bridge::planning::{Assessment, Options, Planned, Precision, Rollout, Status, assess, plan};
+use quietpath_tests::figures::references;
+use quietpath_tests::scenario;
+
+/// Scenarios that are planned as well as the reference plans them from the same start.
+const PLANNED: [&str; 21] = [
+    "square8-detection",
+    "square8-energy",
+    "square8-false-alarm",
+    "square8-cep",
+    "square8-aee",
+    "square8-aee-lagged",
+    "square8-gdop",
+    "square8-worst-detection",
+    "square8-mixed",
+    "square8-deadline-100",
+    "square8-deadline-105",
+    "square8-deadline-110",
+    "square8-deadline-115",
+    "square8-jam",
+    "square8-jam-risk",
+    "square8-team",
+    "dropout4-0",
+    "dropout4-17",
+    "dropout4-35",
+    "swarm4",
+    "volume8-detection",
+];
+
+/// How much worse than the reference from the same start a plan may be, relative to max(1, |reference|).
+const GAP_MAX: f64 = 0.01;
+/// Largest difference of the claimed objective from the recomputed one, relative to max(1, |objective|).
+const CLAIM_ERROR_MAX: f64 = 1e-9;
+
+/// Plans a scenario, writes the plan, reads it back and weighs it.
+fn planned(name: &str, precision: Precision) -> (Planned, Assessment) {
+    let scenario = scenario(name);
+    let options = Options { precision, ..Options::default() };
+    let planned = plan(&scenario, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let written = PlanFile::parse(name, &planned.plan.to_json()).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let assessment = assess(&scenario, &written, name).unwrap_or_else(|error| panic!("{name}: {error}"));
+    (planned, assessment)
+}
+
+/// Difference relative to max(1, |reference|).
+fn relative(figure: f64, reference: f64) -> f64 {
+    (figure - reference) / reference.abs().max(1.0)
+}
+
+/// Plans a scenario, prints its line of the table, and returns the gap to the reference once everything else holds.
+fn gap(name: &str, reference: f64) -> f64 {
+    let (planned, assessment) = planned(name, Precision::F64);
+    let gap = relative(assessment.objective, reference);
+    let (constraint, violation) = assessment.worst;
+    let status = planned.status.name();
+    println!("{name:26} {:14.6} {reference:14.6} {gap:9.1e} {violation:9.1e}  {status}", assessment.objective);
+    assert!(assessment.feasible, "{name}: {constraint} violated by {violation}");
+    let claimed = planned.plan.objective.expect("a plan claims an objective");
+    let error = relative(claimed, assessment.objective).abs();
+    assert!(error <= CLAIM_ERROR_MAX, "{name}: claims {claimed}, is {}", assessment.objective);
+    assert!(!matches!(planned.status, Status::Infeasible | Status::NonFinite), "{name}: {status}");
+    gap
+}
+
+#[test]
+fn every_scenario_is_planned_as_well_as_the_reference() {
+    let references = references();
+    println!("{:26} {:>14} {:>14} {:>9} {:>9}  status", "scenario", "objective", "reference", "gap", "violation");
+    for name in PLANNED {
+        let gap = gap(name, references[name].straight_line_start);
+        assert!(gap <= GAP_MAX, "{name}: worse than the reference by {gap:.1e}");
+    }
+}
+
+/// The directions of a beam have many optima of their own; from this start ours ends in a lesser one.
+#[test]
+fn a_directed_beam_is_planned_nearly_as_well() {
+    let gap = gap("square8-beam", references()["square8-beam"].straight_line_start);
+    assert!(gap <= 0.02, "worse than the reference by {gap:.1e}");
+}
+
+#[test]
+fn single_precision_plans_nearly_as_well() {
+    for name in
+        ["square8-detection", "square8-energy", "square8-aee-lagged", "square8-worst-detection", "volume8-detection"]
+    {
+        let (_, double) = planned(name, Precision::F64);
+        let (_, single) = planned(name, Precision::F32);
+        let gap = relative(single.objective, double.objective);
+        println!("{name:26} {:14.6} {:14.6} {gap:9.1e} {:9.1e}", double.objective, single.objective, single.worst.1);
+        assert!(single.feasible, "{name}: {:?}", single.worst);
+        assert!(gap <= 1e-3, "{name}: {} in f32, {} in f64", single.objective, double.objective);
+    }
+}
+
+#[test]
+fn regions_limits_and_steps_are_kept_or_refused_but_never_ignored() {
+    for (name, field) in [("square8-limit", "limit"), ("wight", "region"), ("wight-jam", "region")] {
+        let scenario = scenario(name);
+        match plan(&scenario, &Options { rollout: Rollout::Once, ..Options::default() }) {
+            Ok(planned) => assert!(planned.assessment.feasible, "{name}: {:?}", planned.assessment.worst),
+            Err(error) => assert!(error.to_string().contains(field), "{name}: no {field} in\n{error}"),
+        }
+    }
+}
