@@ -133,6 +133,26 @@ fn the_start_velocity_counts_as_a_velocity() {
 }
 
 #[test]
+fn at_a_seam_the_interval_before_counts_too() {
+    let stored = scenario();
+    let mut view = stored.view();
+    let mut plan = Plan::straight(&view, 10.0).expect("it fits");
+    // 0.3 / s northward of the start velocity, and back again: 0.6 / s^2 over a first interval of 0.5 s.
+    plan.tracks[0].path[1][1] += 0.15;
+    for (node, time) in plan.times.iter_mut().enumerate().skip(1) {
+        *time = 0.5 + 2.0 * (node - 1) as f64;
+    }
+    plan.tracks[0].path[1][0] = 1.4;
+    let mut accel = |before| {
+        view.frame.start_interval = before;
+        violations(&view, &plan, &mut [Sample::default()]).accel
+    };
+    assert!((accel(None) - (0.3 / 0.5 / 0.5 - 1.0)).abs() < 1e-9);
+    assert!((accel(Some(0.6)) - (0.3 / 0.55 / 0.5 - 1.0)).abs() < 1e-9);
+    assert_eq!(accel(Some(2.0)), 0.0);
+}
+
+#[test]
 fn intervals_that_do_not_advance() {
     let found = broken(|plan| plan.times[4] = plan.times[3]);
     assert!(found.contains(&("speed", f64::INFINITY)), "{found:?}");

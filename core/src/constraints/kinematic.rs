@@ -6,9 +6,10 @@
 //! | v_i = (x_i - x_(i-1)) / h_i | velocity | length unit / s | N |
 //! | a_i = 2 (v_(i+1) - v_i) / (h_(i+1) + h_i) | acceleration | length unit / s^2 | N - 1 |
 //!
-//! |v_i| <= speed_max, |a_i| <= accel_max, and with a start velocity also |v_1 - v| / h_1 <= accel_max.
+//! |v_i| <= speed_max, |a_i| <= accel_max, and with a start velocity also |v_1 - v| / h_1 <= accel_max; where the start
+//! is a seam that an interval h_0 leads up to, 2 |v_1 - v| / (h_1 + h_0) <= accel_max.
 //!
-//! Source: section 4.1.
+//! Source: section 4.1, and Remark 3.3.3 for seams.
 
 use crate::constraints::Worst;
 use crate::math::{Point, Real, norm};
@@ -35,17 +36,28 @@ pub fn speed_excess<T: Real, const DIM: usize>(speed_max: T, times: &[T], path: 
     worst
 }
 
+/// How an agent comes to the start: its velocity (length units per s), where that is given, and the interval flown at it
+/// (s), where there was one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach<T, const DIM: usize> {
+    /// Velocity before the start.
+    pub velocity: Option<Point<T, DIM>>,
+    /// Interval before the start.
+    pub interval: Option<T>,
+}
+
 /// Largest acceleration over `accel_max`, less 1; 0 where none exceeds it.
 pub fn accel_excess<T: Real, const DIM: usize>(
     accel_max: T,
-    start_velocity: Option<Point<T, DIM>>,
+    approach: Approach<T, DIM>,
     times: &[T],
     path: &[Point<T, DIM>],
 ) -> Worst<T> {
     let mut worst = Worst::none();
     let velocities = velocities(times, path);
-    if let (Some(start), Some((interval, first))) = (start_velocity, velocities.clone().next()) {
-        worst.raise(0, norm(&(first - start)) / interval / accel_max - T::one());
+    if let (Some(start), Some((interval, first))) = (approach.velocity, velocities.clone().next()) {
+        let mean = T::real(0.5) * (interval + approach.interval.unwrap_or(interval));
+        worst.raise(0, norm(&(first - start)) / mean / accel_max - T::one());
     }
     for (index, ((before, from), (after, to))) in velocities.clone().zip(velocities.skip(1)).enumerate() {
         let mean = T::real(0.5) * (before + after);

@@ -34,6 +34,7 @@ mod place;
 
 pub use place::{Constraint, Place, Worst};
 
+use crate::constraints::kinematic::Approach;
 use crate::math::{Point, Real, norm};
 use crate::metrics::Sample;
 use crate::scenario::{Domain, View};
@@ -226,7 +227,8 @@ fn own_bounds<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize
     visit(Constraint::Goal, off(nodes - 1, &agent.goal));
     visit(Constraint::Domain, domain::excess(&scenario.frame.domain, path).relative_to(span));
     visit(Constraint::Speed, kinematic::speed_excess(agent.speed_max, times, path));
-    visit(Constraint::Accel, kinematic::accel_excess(agent.accel_max, agent.start_velocity, times, path));
+    let approach = Approach { velocity: agent.start_velocity, interval: scenario.frame.start_interval };
+    visit(Constraint::Accel, kinematic::accel_excess(agent.accel_max, approach, times, path));
     let jam = track.jam.get(..nodes).unwrap_or_default();
     let jam_budget = agent.jammer.map_or(T::zero(), |jammer| jammer.budget);
     visit(Constraint::JamBounds, budget::bounds_excess(jam));

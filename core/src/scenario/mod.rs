@@ -245,6 +245,19 @@ pub enum Motion<'a, T, const DIM: usize> {
     Fixed(Point<T, DIM>),
     /// It moves linearly from entry to entry, and rests before the first and after the last.
     Track(&'a [Knot<T, DIM>]),
+    /// It keeps its velocity, before and after it was seen.
+    Steady(Sighting<T, DIM>),
+}
+
+/// A sensor as it was seen at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting<T, const DIM: usize> {
+    /// When, s.
+    pub time: T,
+    /// Where, length units.
+    pub position: Point<T, DIM>,
+    /// How it moved, length units per s.
+    pub velocity: Point<T, DIM>,
 }
 
 /// Variance of a sensor's distance estimator, length unit squared.
@@ -448,6 +461,7 @@ pub struct Draft<'a, T, const DIM: usize> {
 pub(crate) enum StoredMotion<T, const DIM: usize> {
     Fixed(Point<T, DIM>),
     Track { first: usize, count: usize },
+    Steady(Sighting<T, DIM>),
 }
 
 /// A sensor, as a [`Scenario`] holds it.
@@ -466,7 +480,19 @@ impl<T, const DIM: usize> StoredSensor<T, DIM> {
     /// Whether the sensor moves.
     #[must_use]
     pub const fn is_moving(&self) -> bool {
-        matches!(self.motion, StoredMotion::Track { .. })
+        !matches!(self.motion, StoredMotion::Fixed(_))
+    }
+
+    /// The same sensor, at rest at `position` (length units).
+    #[must_use]
+    pub fn at_rest(self, position: Point<T, DIM>) -> Self {
+        Self { motion: StoredMotion::Fixed(position), ..self }
+    }
+
+    /// The same sensor, keeping the velocity that it was seen with.
+    #[must_use]
+    pub fn steady(self, sighting: Sighting<T, DIM>) -> Self {
+        Self { motion: StoredMotion::Steady(sighting), ..self }
     }
 }
 
@@ -483,6 +509,10 @@ pub struct Frame<T, const DIM: usize> {
     pub intervals: usize,
     /// Time at node 0, s.
     pub start_time: T,
+    /// The interval that was flown at the agents' start velocities before the start, s: the start is a seam between
+    /// two plans, and the change of velocity there counts over the mean of the intervals on both sides. Without one
+    /// it counts over the first interval.
+    pub start_interval: Option<T>,
     /// Flight-time bound and penalty.
     pub time: Timing<T>,
     /// The box that the flight stays in.
@@ -531,6 +561,7 @@ impl<T: Real, const DIM: usize, const SENSORS: usize, const AGENTS: usize, const
                     })?;
                     StoredMotion::Track { first, count: entries.len() }
                 }
+                Motion::Steady(sighting) => StoredMotion::Steady(sighting),
             };
             let stored =
                 StoredSensor { motion, ranging: sensor.ranging, detection: sensor.detection, jam: sensor.jam };
@@ -543,6 +574,7 @@ impl<T: Real, const DIM: usize, const SENSORS: usize, const AGENTS: usize, const
                 pooling: draft.pooling,
                 intervals: draft.intervals,
                 start_time: draft.start_time,
+                start_interval: None,
                 time: draft.time,
                 domain: draft.domain,
                 separation: draft.separation,
@@ -573,7 +605,7 @@ impl<T: Real, const DIM: usize, const SENSORS: usize, const AGENTS: usize, const
 
 fn total_knots<T, const DIM: usize>(sensors: &[Sensor<'_, T, DIM>]) -> usize {
     let count = |sensor: &Sensor<'_, T, DIM>| match sensor.motion {
-        Motion::Fixed(_) => 0,
+        Motion::Fixed(_) | Motion::Steady(_) => 0,
         Motion::Track(entries) => entries.len(),
     };
     sensors.iter().map(count).sum()
@@ -605,7 +637,13 @@ pub struct View<'a, T, const DIM: usize> {
     pub limits: &'a [Limit<T>],
 }
 
-impl<T: Real, const DIM: usize> View<'_, T, DIM> {
+impl<'a, T: Real, const DIM: usize> View<'a, T, DIM> {
+    /// The same problem with other sensors. They may be those of this view, at rest, steady or on their tracks.
+    #[must_use]
+    pub const fn with_sensors(self, sensors: &'a [StoredSensor<T, DIM>]) -> Self {
+        Self { sensors, ..self }
+    }
+
     /// Position (length units) and velocity (length units per s) of a sensor at `time` (s).
     ///
     /// The velocity is zero before the first and after the last entry of a track, and that of the segment that
@@ -618,6 +656,9 @@ impl<T: Real, const DIM: usize> View<'_, T, DIM> {
             StoredMotion::Track { first, count } => {
                 let knots = self.knots.get(first..first + count).unwrap_or_default();
                 track_state(knots, time)
+            }
+            StoredMotion::Steady(sighting) => {
+                (sighting.position + sighting.velocity * (time - sighting.time), sighting.velocity)
             }
         }
     }

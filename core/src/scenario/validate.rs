@@ -154,6 +154,11 @@ fn sensor<T: Real, const DIM: usize>(item: Item, sensor: &Sensor<'_, T, DIM>) ->
                 return field("track").fails(Fault::NotIncreasing { entry: index + 1 });
             }
         }
+        Motion::Steady(sighting) => {
+            field("time").finite(sighting.time)?;
+            field("position").all_finite(&sighting.position)?;
+            field("velocity").all_finite(&sighting.velocity)?;
+        }
     }
     match sensor.ranging {
         Some(Ranging::Rss { scale, path_loss }) => {

@@ -136,8 +136,23 @@ pub(super) struct AgentFrame<T, const DIM: usize> {
     pub(super) bend_max: T,
     /// Start velocity over v, where it is given.
     pub(super) start_velocity: Option<Point<T, DIM>>,
+    /// a h_0 / v with the interval h_0 before the start, where the start is a seam between two plans.
+    pub(super) seam: Option<T>,
     /// Bounds of the controls by [`Kind`].
     pub(super) controls: [Bound<T>; KINDS],
+}
+
+impl<T: Real, const DIM: usize> AgentFrame<T, DIM> {
+    /// The bound on the change from the start velocity to the first step, where that on other changes is `bend`: at a
+    /// seam a (h + h_0) / 2, half of which moves with the pace, and otherwise the same.
+    pub(super) fn first_bend(&self, bend: T) -> T {
+        self.seam.map_or(bend, |seam| (bend + seam) * T::real(0.5))
+    }
+
+    /// Derivative of [`Self::first_bend`] by the pace, where that of `bend` is `bend_by_pace`.
+    pub(super) fn first_bend_by_pace(&self, bend_by_pace: T) -> T {
+        if self.seam.is_some() { bend_by_pace * T::real(0.5) } else { bend_by_pace }
+    }
 }
 
 /// The map between iterates and trajectories of one scenario.
@@ -170,6 +185,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
             reach: Point::zeros(),
             bend_max: T::one(),
             start_velocity: None,
+            seam: None,
             controls: [Bound::Off; KINDS],
         };
         let mut agent = [none; AGENTS];
@@ -183,6 +199,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
                 reach: line / stride,
                 bend_max: given.accel_max * interval / given.speed_max,
                 start_velocity: given.start_velocity.map(|velocity| velocity / given.speed_max),
+                seam: scenario.frame.start_interval.map(|before| given.accel_max * before / given.speed_max),
                 controls: control_bounds(given, interval),
             };
         }

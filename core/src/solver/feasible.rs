@@ -77,10 +77,12 @@ fn agent_share<T: Real, const DIM: usize, const AGENTS: usize>(
     let mut before = (zero, zero);
     let mut step_before: Option<(Point<T, DIM>, Point<T, DIM>)> =
         agent.start_velocity.map(|velocity| (velocity - cruise.0, velocity - cruise.1));
-    for (a, b) in from.0.iter().zip(to.0).chain(ends) {
+    let first = (agent.first_bend(bend.0), agent.first_bend(bend.1));
+    for (index, (a, b)) in from.0.iter().zip(to.0).chain(ends).enumerate() {
         let step = (a - before.0, b - before.1);
         share = share.min(ball_share(&(step.0 + cruise.0), &(step.1 + cruise.1), T::one(), T::one()));
         if let Some(last) = step_before {
+            let bend = if index == 0 { first } else { bend };
             share = share.min(ball_share(&(step.0 - last.0), &(step.1 - last.1), bend.0, bend.1));
         }
         before = (*a, *b);

@@ -449,7 +449,8 @@ fn push_steps<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize
 ) {
     let kept = T::one() - request.margin;
     let cruise = request.frame.cruise(agent, pace);
-    let bend_radius = bend_bound(agent.bend_max, center, pace) * kept;
+    let bend_most = bend_bound(agent.bend_max, center, pace);
+    let mut bend_radius = agent.first_bend(bend_most) * kept;
     let zero = Point::<T, DIM>::zeros();
     let mut before = zero;
     let mut step_before = agent.start_velocity.map(|velocity| velocity - cruise);
@@ -461,6 +462,7 @@ fn push_steps<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize
             bend.hold_in_ball(&(change - last), bend_radius, residual);
         }
         (before, step_before) = (offset, Some(change));
+        bend_radius = bend_most * kept;
     }
 }
 

@@ -2,11 +2,13 @@
 //!
 //! Without start velocities the straight line at constant speed is feasible whenever the goal can be reached, and
 //! strictly so for any flight time longer than the shortest. With them, the straight line is projected on the
-//! bounds at one flight time after another until a feasible path comes out.
+//! bounds at one flight time after another until a feasible path comes out. Regions, separations and limits do not count
+//! here: the planner leads a start that is not clear of them to where it is.
 
 use crate::constraints;
 use crate::error::{Error, Fault, Item};
 use crate::math::{Point, Real, norm, norm_squared};
+use crate::metrics::Sample;
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
 
@@ -27,8 +29,9 @@ pub enum Start<'a, T, const DIM: usize, const NODES: usize, const AGENTS: usize>
     Straight,
     /// The best of several lattice searches over the whole domain and of the straight lines.
     Global,
-    /// A trajectory of the caller, such as an earlier plan; it is used if it is feasible, and otherwise the
-    /// straight lines are.
+    /// A trajectory of the caller, such as an earlier plan. It is used if it keeps all bounds but regions, separations
+    /// and limits, which the planner leads it clear of. Where agents have start velocities, it is otherwise projected
+    /// on the bounds; if that fails, the straight lines are used.
     Given(&'a Trajectory<T, DIM, NODES, AGENTS>),
 }
 
@@ -74,18 +77,25 @@ where
     T: Real,
 {
     let allowed = scenario.frame.time.max - scenario.frame.start_time;
+    let has_velocity = scenario.agents.iter().any(|agent| agent.start_velocity.is_some());
     if is_straight_only(scenario) {
         workspace.best = Trajectory::straight(scenario, allowed)?;
         return Ok(());
     }
     if let Start::Given(given) = start {
         let fits = given.intervals() == scenario.frame.intervals && given.agents() == scenario.agents.len();
-        if fits && is_feasible(scenario, given, workspace) {
+        if fits && bounds_excess(scenario, given, &mut workspace.scratch) <= T::real(constraints::TOLERANCE) {
             workspace.best.clone_from(given);
             return Ok(());
         }
+        if fits && has_velocity {
+            workspace.trial.clone_from(given);
+            if bring_within(scenario, settings, given.duration().min(allowed), workspace) {
+                core::mem::swap(&mut workspace.best, &mut workspace.trial);
+                return Ok(());
+            }
+        }
     }
-    let has_velocity = scenario.agents.iter().any(|agent| agent.start_velocity.is_some());
     let first = first_duration(scenario);
     if !has_velocity {
         workspace.best = Trajectory::straight(scenario, first)?;
@@ -95,7 +105,10 @@ where
     let shortest = shortest_duration(scenario).max(first * T::real(0.1));
     for stretch in STRETCHES {
         let duration = (shortest * T::real(stretch)).min(allowed);
-        if follow_start_velocity(scenario, settings, duration, workspace)? {
+        workspace.trial = Trajectory::straight(scenario, duration)?;
+        if bring_within(scenario, settings, duration, workspace) {
+            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+            lay_controls(scenario, &mut workspace.best);
             return Ok(());
         }
     }
@@ -103,31 +116,29 @@ where
     Err(Error::new(Item::Agent(agent), "start_velocity", Fault::StartVelocity))
 }
 
-fn is_feasible<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+/// The largest violation of what the projection knows: everything but regions, separations and limits.
+fn bounds_excess<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    scratch: &mut [Sample<T, DIM>],
+) -> T {
+    let found = constraints::violations(scenario, trajectory, scratch);
+    let zero = T::zero();
+    constraints::Violations { limit: zero, region: zero, separation: zero, ..found }.worst().1
+}
+
+/// Projects `workspace.trial`, flown in `duration` seconds, on the bounds; whether it keeps them then.
+fn bring_within<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    duration: T,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
 ) -> bool
 where
     T: Real,
 {
-    let violations = constraints::violations(scenario, trajectory, &mut workspace.scratch);
-    violations.worst().1 <= T::real(constraints::TOLERANCE)
-}
-
-/// Projects the straight line of the given flight time on the bounds; true if what comes out is feasible, and
-/// then in `workspace.best`.
-fn follow_start_velocity<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    settings: &Settings<T>,
-    duration: T,
-    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-) -> Result<bool, Error>
-where
-    T: Real,
-{
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, duration);
-    workspace.trial = Trajectory::straight(scenario, duration)?;
+    workspace.trial.set_duration(scenario.frame.start_time, duration);
     frame.collapse(&workspace.trial, &mut workspace.iterate);
     let mut none = Iterate::zeros();
     none.pace = T::zero();
@@ -142,13 +153,7 @@ where
     };
     workspace.projection.project(&request, &workspace.iterate, &none, &mut workspace.candidate);
     frame.expand(&workspace.candidate, &mut workspace.trial);
-    let violations = constraints::violations(scenario, &workspace.trial, &mut workspace.scratch);
-    let is_inside = violations.worst().1 <= T::zero();
-    if is_inside {
-        workspace.best.clone_from(&workspace.trial);
-        lay_controls(scenario, &mut workspace.best);
-    }
-    Ok(is_inside)
+    bounds_excess(scenario, &workspace.trial, &mut workspace.scratch) <= T::zero()
 }
 
 /// Spreads a part of each budget evenly over the flight, and points beams at the nearest ranging sensor.

@@ -88,14 +88,16 @@ fn product(frame: &Frame<f64, 2, 2>, a: &Path, b: &Path, c: &Path, d: &Path) -> 
 #[test]
 fn is_the_nearest_feasible_point() {
     let velocity = Point::<f64, 2>::new(0.1, -0.2);
-    for (name, accel_max, height, start_velocity) in [
-        ("speed", 1e3, 50.0, None),
-        ("acceleration", 0.02, 50.0, None),
-        ("box", 1e3, 4.2, None),
-        ("all", 0.03, 4.2, Some(velocity)),
+    for (name, accel_max, height, start_velocity, start_interval) in [
+        ("speed", 1e3, 50.0, None, None),
+        ("acceleration", 0.02, 50.0, None, None),
+        ("box", 1e3, 4.2, None, None),
+        ("all", 0.03, 4.2, Some(velocity), None),
+        ("seam", 0.03, 50.0, Some(velocity), Some(3.0)),
     ] {
         let scenario = scenario(accel_max, height, start_velocity);
-        let view = scenario.view();
+        let mut view = scenario.view();
+        view.frame.start_interval = start_interval;
         let frame = Frame::<f64, 2, 2>::new(&view, 22.0);
         let mut numbers = Numbers(7);
         let mut projection = Projection::<f64, 2, 32, 2>::empty();

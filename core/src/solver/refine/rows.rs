@@ -106,8 +106,8 @@ pub(super) fn for_each_ball<T: Real, const DIM: usize, const AGENTS: usize>(
                     weights: [one, zero, zero],
                     value: step + cruise - velocity,
                     by_pace: rate,
-                    radius: bend,
-                    radius_by_pace: bend_by_pace,
+                    radius: agent.first_bend(bend),
+                    radius_by_pace: agent.first_bend_by_pace(bend_by_pace),
                 },
             );
         }
