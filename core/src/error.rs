@@ -137,8 +137,6 @@ pub enum Fault {
     },
     /// The acceleration bound cannot take the start velocity to a path that ends at the goal in time.
     StartVelocity,
-    /// The model has this part, this version of the planner does not yet.
-    Unsupported,
 }
 
 impl fmt::Display for Fault {
@@ -179,7 +177,6 @@ impl fmt::Display for Fault {
             Self::StartVelocity => f.write_str(
                 "cannot be followed to the goal within the speed and acceleration bounds in the time there is",
             ),
-            Self::Unsupported => f.write_str("is not planned by this version"),
         }
     }
 }

@@ -6,15 +6,16 @@
 
 use heapless::Vec;
 
+use crate::constraints::Constraint;
 use crate::math::Real;
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
-use crate::warm_start::{self, Obstruction, Variant};
+use crate::warm_start::{self, Variant};
 
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
 use super::projection::Request;
-use super::{Ledger, Settings, Status, Workspace, improve, projected_gradient};
+use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, projected_gradient};
 
 /// Projected-gradient iterations of one candidate.
 const POLISH_ITERATIONS: usize = 12;
@@ -30,27 +31,31 @@ const ORDERED_MAX: usize = 3;
 
 /// Improves the feasible `workspace.best`, whose path may be any, by the best of all candidates.
 ///
-/// Returns [`Status::Infeasible`] where no candidate comes clear of regions and limits.
+/// Returns [`Status::Infeasible`] where no candidate comes clear of regions and limits, and what closes the way where the
+/// lattice has none in any variant.
 pub(super) fn search<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ledger: &mut Ledger<T>,
     deadline: &mut dyn FnMut() -> bool,
-) -> Status
+) -> (Status, Option<Obstacle<T, DIM>>)
 where
     T: Real,
 {
     workspace.base.clone_from(&workspace.best);
-    let mut found = Found { status: Status::Infeasible, least: T::INFINITY };
+    let mut found = Found { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY };
     let mut candidates = Candidates::<T>::new();
+    let mut way = Way::Unknown;
     for order in 0..orders(scenario) {
         for variant in warm_start::variants(scenario) {
             if deadline() {
                 break;
             }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
-            if lay(scenario, &variant, order, workspace).is_ok()
+            let laid = lay(scenario, &variant, order, workspace);
+            way = way.after(laid, variant.duration);
+            if laid.is_ok()
                 && let Some(objective) = project(scenario, settings, workspace, ledger)
             {
                 enter(&mut candidates, (objective, order, variant));
@@ -68,15 +73,45 @@ where
     }
     workspace.best.clone_from(&workspace.champion);
     if found.status == Status::Infeasible {
-        return found.status;
+        let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
+        return (found.status, closing);
     }
-    improve(scenario, settings, workspace, ledger, deadline)
+    (improve(scenario, settings, workspace, ledger, deadline), None)
 }
 
-/// The best candidate so far.
+/// The best candidate so far; while none is feasible, the one that comes nearest to that.
 struct Found<T> {
     status: Status,
     least: T,
+    slack: T,
+}
+
+/// What the lattice says of the way to the goal.
+#[derive(Clone, Copy)]
+enum Way<T, const DIM: usize> {
+    Unknown,
+    /// Closed in all variants so far; of these, the one with the most time to go round.
+    Closed {
+        by: Obstacle<T, DIM>,
+        duration: T,
+    },
+    Open,
+}
+
+impl<T: Real, const DIM: usize> Way<T, DIM> {
+    /// What is known after one more variant.
+    fn after(self, laid: Result<(), Obstacle<T, DIM>>, duration: T) -> Self {
+        match (self, laid) {
+            (Self::Open, _) | (_, Ok(())) => Self::Open,
+            (Self::Closed { by, duration: longest }, Err(other)) => {
+                // That time is short says less than what it is too short to go round.
+                let rank = |by: &Obstacle<T, DIM>| by.constraint != Constraint::Duration;
+                let is_plainer = (rank(&other), duration) > (rank(&by), longest);
+                if is_plainer { Self::Closed { by: other, duration } } else { self }
+            }
+            (Self::Unknown, Err(by)) => Self::Closed { by, duration },
+        }
+    }
 }
 
 /// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
@@ -97,10 +132,14 @@ fn compete<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
     let status = improve(scenario, &short, workspace, ledger, deadline);
     let is_first = found.least == T::INFINITY;
     if status != Status::Infeasible && (ledger.best < found.least || is_first) {
-        *found = Found { status, least: ledger.best };
+        *found = Found { status, least: ledger.best, slack: T::zero() };
         workspace.champion.clone_from(&workspace.best);
-    } else if is_first && found.status == Status::Infeasible {
-        workspace.champion.clone_from(&workspace.best);
+    } else if found.status == Status::Infeasible {
+        let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
+        if slack > found.slack {
+            found.slack = slack;
+            workspace.champion.clone_from(&workspace.best);
+        }
     }
 }
 
@@ -132,12 +171,14 @@ fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
     variant: &Variant<T>,
     order: usize,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-) -> Result<(), Obstruction<T, DIM>> {
+) -> Result<(), Obstacle<T, DIM>> {
     let Workspace { base, trial, lattice, scratch, .. } = workspace;
     trial.clone_from(base);
     let agents = scenario.agents.len();
     for place in 0..agents {
-        warm_start::search(scenario, trial, at_place(order, place, agents), variant, lattice, scratch)?;
+        let agent = at_place(order, place, agents);
+        let found = warm_start::search(scenario, trial, agent, variant, lattice, scratch);
+        found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?;
     }
     Ok(())
 }

@@ -21,6 +21,7 @@
 //! - `projected_gradient`: spectral steps, a non-monotone line search, and smoothing of worst-case terms.
 //! - `guard`: regions, separations and limits, which are not convex, as barriers and penalties.
 //! - `refine`: a primal-dual interior point method with banded systems, from where the gradient leaves off.
+//! - `obstacle`: what stands in the way where no feasible plan is found.
 //! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
 //!
 //! Limits: one basin from [`Start::Straight`] or [`Start::Given`]; the best of a few from [`Start::Global`].
@@ -31,6 +32,7 @@ mod coordinates;
 mod feasible;
 mod global;
 mod guard;
+mod obstacle;
 mod projected_gradient;
 mod projection;
 mod refine;
@@ -38,6 +40,7 @@ mod settings;
 mod start;
 mod workspace;
 
+pub use obstacle::{Extent, Obstacle};
 pub use settings::Settings;
 pub use start::Start;
 pub use workspace::Workspace;
@@ -57,7 +60,7 @@ pub enum Status {
     IterationLimit,
     /// The caller's deadline came first.
     Deadline,
-    /// No feasible plan was found to start from.
+    /// No feasible plan was found; [`Outcome::obstacle`] says what stands in the way.
     Infeasible,
     /// No step along the projected gradient improves the plan any more, and the gradient has not vanished.
     Stalled,
@@ -82,9 +85,11 @@ impl Status {
 
 /// What a call of [`plan`] did; the plan itself is [`Workspace::best`].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome<T> {
+pub struct Outcome<T, const DIM: usize> {
     /// Why it stopped.
     pub status: Status,
+    /// What stands in the way, where the status is [`Status::Infeasible`].
+    pub obstacle: Option<Obstacle<T, DIM>>,
     /// Objective of the plan, worst-case terms exact.
     pub objective: T,
     /// Projected-gradient iterations done.
@@ -105,15 +110,14 @@ pub struct Outcome<T> {
 /// none.
 ///
 /// # Errors
-/// Where the scenario does not fit the workspace, asks for something this version does not plan, or has a start
-/// velocity that no feasible path can follow. The workspace then holds no plan.
+/// Where the scenario does not fit the workspace, or has a start velocity that no feasible path can follow. The workspace then holds no plan.
 pub fn plan<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
     start: Start<'_, T, DIM, NODES, AGENTS>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     deadline: &mut dyn FnMut() -> bool,
-) -> Result<Outcome<T>, Error>
+) -> Result<Outcome<T, DIM>, Error>
 where
     T: Real,
 {
@@ -122,9 +126,15 @@ where
     start::lay(scenario, settings, start, workspace)?;
     if start::is_straight_only(scenario) {
         let objective = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
-        let status = if objective.finite() { Status::Converged } else { Status::NonFinite };
+        let obstacle = Obstacle::along(scenario, &workspace.best, &mut workspace.scratch);
+        let status = match obstacle {
+            _ if !objective.finite() => Status::NonFinite,
+            None => Status::Converged,
+            Some(_) => Status::Infeasible,
+        };
         return Ok(Outcome {
             status,
+            obstacle,
             objective,
             iterations: 0,
             refinements: 0,
@@ -143,15 +153,21 @@ where
         projection_steps: 0,
         keeps: Keeps::Better,
     };
-    let status = if !first.finite() {
-        Status::NonFinite
+    let (status, closing) = if !first.finite() {
+        (Status::NonFinite, None)
     } else if matches!(start, Start::Global) {
         global::search(scenario, settings, workspace, &mut ledger, deadline)
     } else {
-        improve(scenario, settings, workspace, &mut ledger, deadline)
+        (improve(scenario, settings, workspace, &mut ledger, deadline), None)
+    };
+    let obstacle = if status == Status::Infeasible {
+        closing.or_else(|| Obstacle::along(scenario, &workspace.best, &mut workspace.scratch))
+    } else {
+        None
     };
     Ok(Outcome {
         status,
+        obstacle,
         objective: ledger.best,
         iterations: ledger.iterations,
         refinements: ledger.refinements,

@@ -139,8 +139,9 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
             return None;
         }
         match ending {
-            Ending::Stop(status) => Some(status),
-            Ending::Status(_) => Some(Status::Infeasible),
+            Ending::Stop(Status::NonFinite) => Some(Status::NonFinite),
+            // Cut off or not: what there is cannot be flown.
+            Ending::Stop(_) | Ending::Status(_) => Some(Status::Infeasible),
         }
     }
 

@@ -27,10 +27,10 @@
 
 mod field;
 mod grid;
+mod obstruction;
 
 use heapless::Vec;
 
-use crate::constraints::region::horizontal;
 use crate::math::{Point, Real, norm};
 use crate::metrics::Sample;
 use crate::scenario::{Reduce, View};
@@ -38,6 +38,9 @@ use crate::trajectory::Trajectory;
 
 use field::{Field, SHARPNESS, Slice};
 use grid::{Grid, Moves};
+use obstruction::{first_blocked, first_crossed};
+
+pub use obstruction::{Blocked, Obstruction};
 
 /// Variants that [`variants`] lists at most.
 pub const VARIANTS_MAX: usize = 8;
@@ -57,27 +60,6 @@ pub struct Variant<T> {
     pub inflation: T,
     /// Flight time, s.
     pub duration: T,
-}
-
-/// What keeps a path from the goal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum Blocked {
-    /// A region, by index.
-    Region(usize),
-    /// A limit on a metric, by index.
-    Limit(usize),
-    /// The flight time: it is too short for the way.
-    Time,
-}
-
-/// What closes the way, and where.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Obstruction<T, const DIM: usize> {
-    /// The constraint.
-    pub by: Blocked,
-    /// First blocked position of the path that crosses least of what is blocked, length units.
-    pub position: Point<T, DIM>,
 }
 
 /// How blocked cells are told from free ones.
@@ -205,31 +187,11 @@ where
         }
     }
     let position = scenario.agents.get(agent).map_or(Point::zeros(), |agent| agent.goal);
-    let out_of_time = Obstruction { by: Blocked::Time, position };
+    let out_of_time = Obstruction { by: Blocked::Time, position, time: frame.start_time + variant.duration };
     match lattice.pass(scenario, trajectory, agent, (variant, Caution::Through, 0), scratch) {
         Ok(_) => Err(first_blocked(scenario, trajectory, agent, scratch).unwrap_or(out_of_time)),
         Err(()) => Err(out_of_time),
     }
-}
-
-/// The first blocked position along the path of `agent`.
-fn first_blocked<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
-    agent: usize,
-    scratch: &mut [Sample<T, DIM>],
-) -> Option<Obstruction<T, DIM>> {
-    let field = Field::new(scenario, trajectory, agent, 0, scratch)?;
-    let count = T::from_count(trajectory.intervals().max(1));
-    let path = &trajectory.tracks.get(agent)?.path;
-    for node in 1..trajectory.nodes() {
-        let slice = field.slice(T::from_count(node - 1) / count, T::from_count(node) / count);
-        let position = path.get(node)?;
-        if let Some(by) = field.blocked(&slice, position, T::zero(), scratch) {
-            return Some(Obstruction { by, position: *position });
-        }
-    }
-    None
 }
 
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, CELLS, PARENTS> {
@@ -306,7 +268,8 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         caution: Caution,
         scratch: &mut [Sample<T, DIM>],
     ) {
-        let margin = if caution == Caution::Careful { plan.grid.half_diagonal() } else { T::zero() };
+        // A wall may be thinner than a cell: to be priced, it too has to grow.
+        let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
         let farthest = plan.reach * T::from_count(plan.slices);
         for ((_, center), rate) in plan.grid.iter().zip(&mut self.landscape) {
             let way = norm(&(center - field.agent.start)) + norm(&(field.agent.goal - center));
@@ -531,13 +494,7 @@ fn is_clear<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     (from, to): (&Point<T, DIM>, &Point<T, DIM>),
     caution: Caution,
 ) -> bool {
-    caution == Caution::Through
-        || field
-            .scenario
-            .regions
-            .iter()
-            .filter(|region| slice.meets(region))
-            .all(|region| region.clearance(&horizontal(from), &horizontal(to)).value >= T::zero())
+    caution == Caution::Through || first_crossed(field.scenario, slice, (from, to)).is_none()
 }
 
 #[cfg(test)]

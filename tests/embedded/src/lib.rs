@@ -55,7 +55,7 @@ macro_rules! flight {
                 earlier: Option<&Flight>,
                 workspace: &mut FlightWorkspace,
                 deadline: &mut dyn FnMut() -> bool,
-            ) -> Result<Outcome<$real>, Error> {
+            ) -> Result<Outcome<$real, $dim>, Error> {
                 let start = earlier.map_or(Start::Straight, Start::Given);
                 plan(&scenario.view(), &Settings::default(), start, workspace, deadline)
             }

@@ -105,7 +105,6 @@ impl ScenarioFile {
                 format!("`time.max = {enough}` would do; so would a faster agent or a nearer goal")
             }
             Fault::StartVelocity => "a slower start, a larger `accel_max` or a later `time.max` may do".to_owned(),
-            Fault::Unsupported => "leave it out to plan without it".to_owned(),
         }
     }
 
