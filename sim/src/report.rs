@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use anstyle::{AnsiColor, Style};
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
-use quietpath_bridge::planning::{AgentSeries, Assessment};
+use quietpath_bridge::planning::{AgentSeries, Assessment, Obstacle};
 use quietpath_core::constraints::TOLERANCE;
 use quietpath_core::scenario::{Metric, Sense};
 
@@ -47,6 +47,13 @@ pub fn summary(scenario: &ScenarioFile, plan: &PlanFile, assessment: &Assessment
         row("planning time", &span(timing.plan_seconds));
     }
     text
+}
+
+/// Why there is no feasible plan, and what may help.
+#[must_use]
+pub fn obstacle(scenario: &ScenarioFile, obstacle: &Obstacle) -> String {
+    let (found, help) = (obstacle.describe(scenario), obstacle.remedy());
+    format!("\n{BAD}no feasible plan{BAD:#}: {found}\n  help: {help}\n")
 }
 
 fn agent_rows(scenario: &ScenarioFile, assessment: &Assessment, agent: &AgentSeries) -> Vec<(&'static str, String)> {

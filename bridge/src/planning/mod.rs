@@ -13,13 +13,15 @@
 
 mod assess;
 mod landscape;
+mod obstacle;
 mod solve;
 
 pub use assess::{AgentSeries, Assessment, assess};
 pub use landscape::{Grid, View, landscape};
+pub use obstacle::Obstacle;
 pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};
 
-pub use quietpath_core::solver::Status;
+pub use quietpath_core::solver::{Extent, Status};
 
 use quietpath_core::metrics::Sample;
 

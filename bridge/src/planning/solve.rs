@@ -6,7 +6,7 @@ use quietpath_core::solver::{self, Settings, Start, Status, Workspace};
 use quietpath_core::{Point, Real};
 
 use super::assess::trajectory;
-use super::{Assessment, assess};
+use super::{Assessment, Obstacle, assess};
 use crate::capacity::{AGENTS, HostTrajectory, NODES, SENSORS};
 use crate::file::plan::{AgentPlan, PlanTiming};
 use crate::file::{FileError, PlanFile, ScenarioFile};
@@ -56,6 +56,8 @@ pub struct Planned {
     pub assessment: Assessment,
     /// Why the planner stopped.
     pub status: Status,
+    /// What stands in the way, where there is no feasible plan; [`Obstacle::describe`] puts it into words.
+    pub obstacle: Option<Obstacle>,
     /// Iterations done.
     pub iterations: usize,
     /// Evaluations of the objective.
@@ -88,7 +90,7 @@ pub fn improve(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -
 
 fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>) -> Result<Planned, Box<FileError>> {
     refuse_unplanned(scenario, options)?;
-    let (mut plan, status, iterations, evaluations) =
+    let Solved { mut plan, status, obstacle, iterations, evaluations } =
         super::on_large_stack(|| match (options.precision, scenario.dimension) {
             (Precision::F32, 3) => solve::<f32, 3>(scenario, options, earlier),
             (Precision::F32, _) => solve::<f32, 2>(scenario, options, earlier),
@@ -97,7 +99,7 @@ fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>)
         })?;
     let assessment = assess(scenario, &plan, "the plan")?;
     plan.objective = Some(assessment.objective);
-    Ok(Planned { plan, assessment, status, iterations, evaluations })
+    Ok(Planned { plan, assessment, status, obstacle, iterations, evaluations })
 }
 
 /// Refuses what the file can say and the core cannot hear; the core refuses the rest itself.
@@ -109,7 +111,14 @@ fn refuse_unplanned(scenario: &ScenarioFile, options: &Options) -> Result<(), Bo
     Ok(())
 }
 
-type Solved = (PlanFile, Status, usize, usize);
+/// What the core says, its dimension and precision left behind.
+struct Solved {
+    plan: PlanFile,
+    status: Status,
+    obstacle: Option<Obstacle>,
+    iterations: usize,
+    evaluations: usize,
+}
 
 fn solve<T: Real, const DIM: usize>(
     scenario: &ScenarioFile,
@@ -135,7 +144,8 @@ fn solve<T: Real, const DIM: usize>(
         timing: Some(PlanTiming { plan_seconds }),
         ..written(scenario, workspace.best())
     };
-    Ok((plan, outcome.status, outcome.iterations, outcome.evaluations))
+    let (status, obstacle) = (outcome.status, outcome.obstacle.as_ref().map(Obstacle::from));
+    Ok(Solved { plan, status, obstacle, iterations: outcome.iterations, evaluations: outcome.evaluations })
 }
 
 /// A trajectory of the planner's equal intervals as a plan.

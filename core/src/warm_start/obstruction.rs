@@ -67,7 +67,6 @@ pub(super) fn first_crossed<T: Real, const DIM: usize, const AGENTS: usize>(
     slice: &Slice<T, DIM, AGENTS>,
     (from, to): (&Point<T, DIM>, &Point<T, DIM>),
 ) -> Option<usize> {
-    let breaks =
-        |region: &Region<T>| region.clearance(&horizontal(from), &horizontal(to)).value < T::zero();
+    let breaks = |region: &Region<T>| region.clearance(&horizontal(from), &horizontal(to)).value < T::zero();
     scenario.regions.iter().position(|region| slice.meets(region) && breaks(region))
 }

@@ -7,6 +7,8 @@
 //! | `series.svg`, `.png` | every figure along the flight |
 //! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
 //! | `path.geojson` | for maps; with latitude and longitude only |
+//!
+//! A plan that is not feasible is drawn and written for people to look at, but not as a mission or map.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -64,7 +66,7 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
     }
     let metric = background(scenario, args.metric)?;
     let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
-    let Planned { plan, assessment, .. } = planned;
+    let Planned { plan, assessment, obstacle, .. } = planned;
     let json_to_stdout = args.plan.as_deref() == Some(Path::new("-"));
     let summary_to = if json_to_stdout { Stream::Err } else { Stream::Out };
     match &args.plan {
@@ -73,6 +75,9 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
         None => {}
     }
     let mut text = report::summary(scenario, &plan, &assessment);
+    if let Some(obstacle) = &obstacle {
+        text.push_str(&report::obstacle(scenario, obstacle));
+    }
     if let Some(folder) = &args.out {
         let flown = Flown { plan: &plan, assessment: &assessment };
         let written = with_progress("drawing", || write_folder(scenario, flown, metric, folder))?;
@@ -135,7 +140,9 @@ fn write_folder(
         put(format!("{name}.svg"), picture.svg().as_bytes())?;
     }
     let mut skipped = None;
-    if scenario.frame.origin.is_none() {
+    if !flown.assessment.feasible {
+        skipped = Some("no mission files: the plan is not feasible".into());
+    } else if scenario.frame.origin.is_none() {
         skipped = Some("no mission files: the scenario has no frame.latitude_deg and frame.longitude_deg".into());
     } else {
         put("path.geojson".into(), geojson::to_geojson(scenario, flown.plan)?.as_bytes())?;

@@ -109,13 +109,13 @@ impl ScenarioFile {
     }
 
     /// `region[1] (south)`.
-    fn region(&self, index: usize) -> String {
+    pub(crate) fn region(&self, index: usize) -> String {
         let name = self.regions.get(index).map_or("", |region| region.name.as_str());
         format!("region[{index}] ({name})")
     }
 
     /// The name of an agent.
-    fn agent_name(&self, index: usize) -> &str {
+    pub(crate) fn agent_name(&self, index: usize) -> &str {
         self.agents.get(index).map_or("", |agent| agent.name.as_str())
     }
 
