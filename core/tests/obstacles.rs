@@ -175,7 +175,7 @@ fn a_plan_that_is_cut_off_in_a_region_is_not_called_feasible() {
 /// The first path may cross a region: the planner leads it out again.
 #[test]
 fn a_start_velocity_is_not_blamed_for_a_region() {
-    let regions = [circle([4.0, 5.0], 1.0)];
+    let regions = [circle([4.0, 5.3], 1.0)];
     let start_velocity = Some(Flat::new(0.05, 0.0));
     for start in [Start::Straight, Start::Global] {
         let (outcome, _) = Problem { regions: &regions, start_velocity, ..EAST }.planned(start, false);

@@ -147,20 +147,38 @@ fn a_helper_raises_the_error_of_the_other_all_the_way() {
     assert!(gains.iter().all(|gain| *gain > 0.1), "{gains:.2?}");
 }
 
-/// The paper sees this in its own plan. Under the objective of the scenario it is not so at the best plan known either: how
-/// much a level helps depends on the distance from the sensors, and the helper jams for itself as well.
+/// The paper sees its helper jam most while the other is in the lowest error. Under the objective of the scenario that is not
+/// the best one can do, in the reference solution neither: how much a level helps depends on the distances of the helper from
+/// the sensors as well, and it jams for itself too. What does hold is that its levels are where they do most: moved to where
+/// the error is lowest, or to where it is highest, they do less.
 #[test]
-#[ignore = "not so in the reference solution"]
-fn a_helper_jams_most_while_the_other_is_in_the_lowest_error() {
+fn a_helper_jams_where_a_second_of_it_does_most() {
     let flown = Flown::new(scenario("square8-team"));
     let (levels, error) = (flown.levels(1, jam), flown.log_aee_unjammed(0));
     let (low, high) = in_low_and_high(levels, &error);
     println!("helper's level {low:.3} where the other's error is low, {high:.3} where it is high");
-    assert!(low > high, "level {low} in low error, {high} in high");
+    let mut order: Vec<usize> = (1..=levels.len()).collect();
+    order.sort_by(|a, b| error[*a - 1].total_cmp(&error[*b - 1]));
+    let quarter = order.len() / 4;
+    let (lowest, highest) = (&order[..quarter], &order[order.len() - quarter..]);
+    let best = flown.plan.objective.expect("an objective");
+    for (what, up, down) in [("low", lowest, highest), ("high", highest, lowest)] {
+        let mut moved = flown.plan.clone();
+        let levels = moved.agents[1].jam.as_mut().expect("the helper jams");
+        up.iter().for_each(|node| levels[*node] += 0.05);
+        down.iter().for_each(|node| levels[*node] -= 0.05);
+        let found = assess(&flown.scenario, &moved, "the plan with jamming moved").unwrap_or_else(|e| panic!("{e}"));
+        println!("{best:.4} as planned, {:.4} with more of it where the error is {what}", found.objective);
+        assert!(found.feasible, "{:?}", found.worst);
+        assert!(
+            found.objective > best,
+            "{} instead of {best} with more of it where the error is {what}",
+            found.objective
+        );
+    }
 }
 
 #[test]
-#[ignore = "the planner stalls with partial silence on several nodes at the ends of an interval"]
 fn silence_is_full_or_none_except_where_it_begins_or_ends() {
     for name in ["dropout4-17", "dropout4-35"] {
         let flown = Flown::new(scenario(name));

@@ -26,7 +26,6 @@ fn crossing(path: &[Vec<f64>], x: f64) -> f64 {
 }
 
 #[test]
-#[ignore = "regions are not planned by this version"]
 fn the_path_goes_between_the_circles_and_arches_south() {
     let (_, planned) = flown("wight");
     let path = &planned.plan.agents[0].path;
@@ -40,7 +39,6 @@ fn the_path_goes_between_the_circles_and_arches_south() {
 }
 
 #[test]
-#[ignore = "regions are not planned by this version"]
 fn with_jamming_the_location_error_ends_larger() {
     let (scenario, jammed) = flown("wight-jam");
     let (_, plain) = flown("wight");
