@@ -1,7 +1,7 @@
 //! Bytes to frames and back.
 //!
 //! The `mavlink` crate frames, checks and decodes. What this module adds is the handling of bytes without a device
-//! ([`Decoder::feed`]), and two mercies: frames of messages that cannot be decoded are counted and not merely lost,
+//! (`Decoder::feed`), and two mercies: frames of messages that cannot be decoded are counted and not merely lost,
 //! and a heartbeat that names a vehicle newer than the dialect is still a heartbeat.
 //!
 //! MAVLink 1 is read, because autopilots speak it on some ports until they hear MAVLink 2, and never written. System
