@@ -37,7 +37,8 @@
 //!     }
 //! }
 //! assert!((70..=90).contains(&heard));
-//! assert_eq!(vehicle.statistics().lost(), 100 - heard as u64);
+//! // Losses show as gaps in the sequence numbers, once a first frame is there.
+//! assert!((0.1..0.3).contains(&vehicle.statistics().loss()));
 //! ```
 
 pub mod address;
