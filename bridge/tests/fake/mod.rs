@@ -105,10 +105,11 @@ impl FakeVehicle {
                     None => out.push(ack(frame.from, list, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE, 0)),
                 }
             }
-            MavMessage::MISSION_ACK(data) if self.is_ours(data.target_system, data.target_component) => {
-                if data.mavtype == MavMissionResult::MAV_MISSION_OPERATION_CANCELLED {
-                    self.receiving = None;
-                }
+            MavMessage::MISSION_ACK(data)
+                if self.is_ours(data.target_system, data.target_component)
+                    && data.mavtype == MavMissionResult::MAV_MISSION_OPERATION_CANCELLED =>
+            {
+                self.receiving = None;
             }
             _ => {}
         }
