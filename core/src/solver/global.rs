@@ -6,10 +6,12 @@
 
 use heapless::Vec;
 
-use crate::constraints::Constraint;
-use crate::math::Real;
+use crate::constraints::region::horizontal;
+use crate::constraints::{Constraint, separation};
+use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
+use crate::trajectory::Trajectory;
 use crate::warm_start::{self, Variant};
 
 use super::coordinates::{Frame, Iterate};
@@ -26,6 +28,10 @@ const CANDIDATES: usize = 4;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
 const PROJECTION_STEPS: usize = 300;
 const PROJECTION_TOLERANCE: f64 = 1e-3;
+/// Part of the least distance that agents who meet head-on miss.
+const HEAD_ON: f64 = 0.8;
+/// Part of the flight in which agents come to keep right, and cease to.
+const RAMP: f64 = 0.1;
 /// Largest team for which every order is tried.
 const ORDERED_MAX: usize = 3;
 
@@ -180,7 +186,53 @@ fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
         let found = warm_start::search(scenario, trial, agent, variant, lattice, scratch);
         found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?;
     }
+    keep_right(scenario, trial);
     Ok(())
+}
+
+/// Moves the paths of agents that meet head-on to their right by half of the least distance, less near their ends.
+///
+/// The lattice does not know of others' ways. Agents that fly through each other have no gradient that parts them; each a
+/// little to its right, they have.
+fn keep_right<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+) {
+    let Some(separation) = scenario.frame.separation else { return };
+    let nodes = trajectory.nodes();
+    let mut meets = [false; AGENTS];
+    let tracks = trajectory.active();
+    for (index, (track, meets)) in tracks.iter().zip(&mut meets).enumerate() {
+        let path = track.path.get(..nodes).unwrap_or_default();
+        let others = tracks.iter().enumerate().filter(|(other, _)| *other != index);
+        *meets = others
+            .map(|(_, other)| separation::excess(separation, path, &other.path).amount)
+            .any(|missing| missing > T::real(HEAD_ON));
+    }
+    for (track, _) in trajectory.active_mut().iter_mut().zip(meets).filter(|(_, meets)| *meets) {
+        aside(&mut track.path, nodes - 1, separation * T::real(0.5));
+    }
+}
+
+/// Moves a path to its right by `distance`, less near its ends.
+fn aside<T: Real, const DIM: usize, const NODES: usize>(
+    path: &mut [Point<T, DIM>; NODES],
+    intervals: usize,
+    distance: T,
+) {
+    let ramp = T::from_count(intervals) * T::real(RAMP);
+    let original = *path;
+    let legs = original.iter().zip(original.iter().skip(2)).take(intervals.saturating_sub(1));
+    for (node, (place, (before, after))) in path.iter_mut().skip(1).zip(legs).enumerate() {
+        let to_end = T::from_count((node + 1).min(intervals - node - 1));
+        let along = horizontal(&(after - before));
+        let length = norm(&along);
+        if length > T::zero() {
+            let part = distance * (to_end / ramp).min(T::one()) / length;
+            let moves = [along[1] * part, -along[0] * part];
+            place.iter_mut().zip(moves).for_each(|(component, aside)| *component += aside);
+        }
+    }
 }
 
 /// The agent at a place of an order, orders counted as digits of falling base.

@@ -131,3 +131,6 @@ fn lifted<T: Real, const DIM: usize>(flat: &Point<T, 2>) -> Point<T, DIM> {
     let mut components = flat.iter().copied();
     Point::from_fn(|_, _| components.next().unwrap_or_default())
 }
+
+#[cfg(test)]
+mod tests;
