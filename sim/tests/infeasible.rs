@@ -92,9 +92,8 @@ fn a_limit_that_cannot_be_met() {
 fn agents_that_cannot_pass_each_other() {
     let other =
         "[[agent]]\nname = \"crow\"\nstart = [8.0, 5.0]\ngoal = [1.0, 5.0]\nspeed_max = 0.1\naccel_max = 0.02\n";
-    let corridor = "[[region]]\nname = \"north\"\npolygon = [[0.0, 5.2], [10.0, 5.2], [10.0, 12.0], [0.0, 12.0]]\n\
-        [[region]]\nname = \"south\"\npolygon = [[0.0, 4.8], [10.0, 4.8], [10.0, -2.0], [0.0, -2.0]]\n";
-    let text = east_with(&format!("{other}{corridor}"));
+    // A corridor that is narrower than the distance.
+    let text = east_with(other).replace("[0.0, 0.0], max = [10.0, 10.0]", "[0.0, 4.8], max = [10.0, 5.2]");
     let room = TempDir::new().expect("a folder");
     let output = planned(&room, &format!("separation = 0.6\n{text}"));
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
