@@ -18,6 +18,8 @@ struct Problem<'a> {
     separation: Option<f64>,
     time_max: f64,
     start_velocity: Option<Flat>,
+    /// Arrival from which on lateness costs its square.
+    target: Option<f64>,
 }
 
 /// One agent flies east through the middle.
@@ -29,6 +31,7 @@ const EAST: Problem<'static> = Problem {
     separation: None,
     time_max: 250.0,
     start_velocity: None,
+    target: None,
 };
 
 impl Problem<'_> {
@@ -64,7 +67,11 @@ impl Problem<'_> {
             reference_point: ReferencePoint::Current,
             intervals: 30,
             start_time: 0.0,
-            time: Timing { max: self.time_max, target: 0.0, penalty: 0.0 },
+            time: Timing {
+                max: self.time_max,
+                target: self.target.unwrap_or_default(),
+                penalty: if self.target.is_some() { 1.0 } else { 0.0 },
+            },
             domain: Domain { min: Flat::new(0.0, 0.0), max: Flat::new(10.0, self.height) },
             separation: self.separation,
             agents: &agents,
@@ -182,4 +189,14 @@ fn a_start_velocity_is_not_blamed_for_a_region() {
         assert_eq!(outcome.obstacle, None, "{start:?}");
         assert!(!matches!(outcome.status, Status::Infeasible | Status::NonFinite), "{start:?} {:?}", outcome.status);
     }
+}
+
+#[test]
+fn a_way_that_makes_late_is_better_than_none() {
+    // Around the south end of the wall it takes about 107 s.
+    let regions = [wall(4.0, 4.05, (1.0, 11.0))];
+    let (outcome, memory) = Problem { regions: &regions, target: Some(75.0), ..EAST }.planned(Start::Global, false);
+    assert_eq!(outcome.obstacle, None, "{:?}", outcome.status);
+    let duration = memory.best().duration();
+    assert!((100.0..115.0).contains(&duration), "{duration}");
 }

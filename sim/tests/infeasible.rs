@@ -120,3 +120,17 @@ fn a_flight_that_can_be_says_nothing_of_this() {
     assert!(!said(&output).contains("no feasible plan"), "{}", said(&output));
     assert!(room.path().join("out/mission.plan").exists());
 }
+
+#[test]
+fn a_sweep_says_what_stands_in_the_way_of_its_plans() {
+    let room = TempDir::new().expect("a folder");
+    let wall = "[[region]]\nname = \"keep-out\"\npolygon = [[4.0, -1.0], [4.05, -1.0], [4.05, 11.0], [4.0, 11.0]]\n";
+    let text = east_with(wall).replace("max = 250.0", "max = 250.0, target = 80.0, penalty = 1.0");
+    fs::write(room.path().join("flight.toml"), text).expect("the scenario");
+    let output = run(&room, &["trade", "flight.toml", "--over", "deadline", "--points", "2"]);
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    let says = ["no feasible plan at 100 %", "region[0] (keep-out)", "help: a smaller region"];
+    for part in says {
+        assert!(said(&output).contains(part), "no `{part}` in\n{}", said(&output));
+    }
+}

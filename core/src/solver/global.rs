@@ -53,9 +53,10 @@ where
     let mut found = Found { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY };
     let mut candidates = Candidates::<T>::new();
     let mut way = Way::Unknown;
+    let hurried = warm_start::variants(scenario);
     for order in 0..orders(scenario) {
-        for variant in warm_start::variants(scenario) {
-            if deadline() {
+        for (number, variant) in hurried.iter().copied().chain(unhurried(scenario)).enumerate() {
+            if deadline() || number >= hurried.len() && matches!(way, Way::Open) {
                 break;
             }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
@@ -83,6 +84,17 @@ where
         return (found.status, closing);
     }
     (improve(scenario, settings, workspace, ledger, deadline), None)
+}
+
+/// Flight times that no penalty on lateness speaks for, up to the last one allowed: where there is no way in time, a late
+/// one is better than none. Empty where there is no such penalty.
+fn unhurried<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+) -> impl Iterator<Item = Variant<T>> + use<T, DIM> {
+    let is_urged = scenario.frame.time.penalty > T::zero();
+    let mut frame = scenario.frame;
+    frame.time.penalty = T::zero();
+    warm_start::variants(&View { frame, ..*scenario }).into_iter().filter(move |_| is_urged)
 }
 
 /// The best candidate so far; while none is feasible, the one that comes nearest to that.

@@ -110,6 +110,25 @@ fn table(swept: &Swept, metrics: &[Metric]) -> String {
         }
         text.push('\n');
     }
+    text.push_str(&obstacles(swept));
+    text
+}
+
+/// Why plans are not feasible, each reason once, with the cases that it stops.
+fn obstacles(swept: &Swept) -> String {
+    let mut reasons: Vec<(String, Vec<String>, &'static str)> = Vec::new();
+    for point in &swept.points {
+        let Some(obstacle) = &point.planned.obstacle else { continue };
+        let (found, label) = (obstacle.describe(&point.case.scenario), point.case.label(swept.over));
+        match reasons.iter_mut().find(|(reason, ..)| *reason == found) {
+            Some((_, labels, _)) => labels.push(label),
+            None => reasons.push((found, vec![label], obstacle.remedy())),
+        }
+    }
+    let mut text = String::new();
+    for (found, labels, help) in reasons {
+        let _ = writeln!(text, "\nno feasible plan at {}: {found}\n  help: {help}", labels.join(", "));
+    }
     text
 }
 
