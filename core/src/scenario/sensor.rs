@@ -145,7 +145,7 @@ pub(crate) enum StoredMotion<T, const DIM: usize> {
     Steady(Sighting<T, DIM>),
 }
 
-/// A sensor, as a [`Scenario`] holds it.
+/// A sensor, as a [`Scenario`](super::Scenario) holds it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoredSensor<T, const DIM: usize> {
     pub(crate) motion: StoredMotion<T, DIM>,
