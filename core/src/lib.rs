@@ -11,6 +11,7 @@ extern crate std;
 
 pub mod constraints;
 pub mod error;
+pub mod horizon;
 pub mod jet;
 pub mod math;
 pub mod metrics;

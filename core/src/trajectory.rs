@@ -135,6 +135,44 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
         self.times.get(self.intervals).copied().unwrap_or_default() - self.start_time()
     }
 
+    /// The interval that ends at a node, s; 0 where there is none.
+    #[must_use]
+    pub fn interval(&self, node: usize) -> T {
+        let time = |node: usize| self.times.get(node).copied().unwrap_or_default();
+        if node == 0 || node > self.intervals { T::zero() } else { time(node) - time(node - 1) }
+    }
+
+    /// Takes the first `count` intervals off, or all there are: node `count` becomes node 0.
+    pub fn advance(&mut self, count: usize) {
+        let count = count.min(self.intervals);
+        let left = self.intervals - count;
+        drop_front(&mut self.times, count, left, T::zero());
+        for track in self.active_mut() {
+            drop_front(&mut track.path, count, left, Point::zeros());
+            for control in [&mut track.jam, &mut track.azimuth, &mut track.dropout] {
+                drop_front(control, count, left, T::zero());
+            }
+        }
+        self.intervals = left;
+    }
+
+    /// Appends a node of another trajectory.
+    ///
+    /// # Errors
+    /// `grid.intervals` where there is no room.
+    pub fn append(&mut self, other: &Self, node: usize) -> Result<(), Error> {
+        let end = self.nodes();
+        self.resize(end, self.agents)?;
+        copy_entry(&other.times, node, &mut self.times, end);
+        for (track, theirs) in self.active_mut().iter_mut().zip(other.active()) {
+            copy_entry(&theirs.path, node, &mut track.path, end);
+            copy_entry(&theirs.jam, node, &mut track.jam, end);
+            copy_entry(&theirs.azimuth, node, &mut track.azimuth, end);
+            copy_entry(&theirs.dropout, node, &mut track.dropout, end);
+        }
+        Ok(())
+    }
+
     /// Lays N equal intervals over `duration` seconds from `start_time`.
     pub fn set_duration(&mut self, start_time: T, duration: T) {
         let nodes = self.nodes();
@@ -154,5 +192,17 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
     pub fn active_mut(&mut self) -> &mut [Track<T, DIM, NODES>] {
         let agents = self.agents.min(AGENTS);
         self.tracks.get_mut(..agents).unwrap_or_default()
+    }
+}
+
+/// Moves entries `count` .. `count + left` to the front, and clears those behind them.
+fn drop_front<V: Copy>(list: &mut [V], count: usize, left: usize, nothing: V) {
+    list.rotate_left(count.min(list.len()));
+    list.get_mut(left + 1..).unwrap_or_default().fill(nothing);
+}
+
+fn copy_entry<V: Copy>(from: &[V], at: usize, to: &mut [V], end: usize) {
+    if let (Some(&entry), Some(slot)) = (from.get(at), to.get_mut(end)) {
+        *slot = entry;
     }
 }

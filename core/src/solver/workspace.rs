@@ -68,6 +68,11 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
     pub const fn best(&self) -> &Trajectory<T, DIM, NODES, AGENTS> {
         &self.best
     }
+
+    /// The plan, and scratch to weigh it with.
+    pub(crate) fn parts(&mut self) -> (&Trajectory<T, DIM, NODES, AGENTS>, &mut [Sample<T, DIM>]) {
+        (&self.best, &mut self.scratch)
+    }
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize> Default

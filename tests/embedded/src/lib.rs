@@ -7,6 +7,7 @@
 #![forbid(unsafe_code)]
 
 use quietpath_core::constraints::{Violations, violations};
+use quietpath_core::horizon::{Horizon, Search, State, Step};
 use quietpath_core::metrics::{Sample, Values};
 use quietpath_core::objective::{Extreme, point_values, value};
 use quietpath_core::scenario::{Draft, Scenario};
@@ -35,6 +36,9 @@ macro_rules! flight {
             /// The planner's memory.
             pub type FlightWorkspace = Workspace<$real, $dim, NODES, SENSORS, AGENTS>;
 
+            /// A flight that is planned in steps.
+            pub type FlightHorizon = Horizon<$real, $dim, NODES, AGENTS>;
+
             /// Bytes of the planner's memory, to be read off the image.
             pub static WORKSPACE_BYTES: usize = size_of::<FlightWorkspace>();
 
@@ -58,6 +62,21 @@ macro_rules! flight {
             ) -> Result<Outcome<$real, $dim>, Error> {
                 let start = earlier.map_or(Start::Straight, Start::Given);
                 plan(&scenario.view(), &Settings::default(), start, workspace, deadline)
+            }
+
+            /// Plans the rest of a flight from where the agents were found.
+            ///
+            /// # Errors
+            /// Another number of agents, or what the planner does not plan.
+            pub fn step(
+                horizon: &mut FlightHorizon,
+                (time, states): ($real, &[State<$real, $dim>]),
+                seen: &FlightScenario,
+                workspace: &mut FlightWorkspace,
+                deadline: &mut dyn FnMut() -> bool,
+            ) -> Result<Step<$real, $dim>, Error> {
+                horizon.resume(time, states)?;
+                horizon.replan(&seen.view(), &Settings::default(), Search::Tail, workspace, deadline)
             }
 
             /// Objective and violations of a plan.
