@@ -7,8 +7,12 @@
 //! | [`frame`] | scenario coordinates to latitude and longitude, and back |
 //! | [`clock`] | time as an argument |
 //! | [`command`] | commands, sent until they are answered |
+//! | [`flight`] | a flight, from the first heartbeat to the last |
 //! | [`link`] | MAVLink over serial lines, datagrams, streams, or a wire in memory |
 //! | [`mission`] | missions on their way to an autopilot and back |
+//! | [`payload`] | transmit power and jamming, relayed to payloads |
+//! | [`replan`] | planning anew in flight: observations in, plans out |
+//! | [`setpoint`] | a plan, steered live |
 //! | [`telemetry`] | what the vehicle says about itself |
 //! | [`planning`] | the door to the core: plan, assess a plan, draw a landscape |
 
@@ -16,8 +20,12 @@ pub mod capacity;
 pub mod clock;
 pub mod command;
 pub mod file;
+pub mod flight;
 pub mod frame;
 pub mod link;
 pub mod mission;
+pub mod payload;
 pub mod planning;
+pub mod replan;
+pub mod setpoint;
 pub mod telemetry;

@@ -94,6 +94,8 @@ pub struct AgentEntry {
     pub weight: f64,
     /// Jamming payload.
     pub jammer: Option<Jammer<f64>>,
+    /// Whether the scenario allows that payload to be switched on in flight. Planning does not ask.
+    pub jammer_live: bool,
     /// Intermittent communication.
     pub dropout: Option<Dropout<f64>>,
 }

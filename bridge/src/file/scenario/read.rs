@@ -36,6 +36,7 @@ const TOP: &[&str] = &[
     "limit",
     "rolling",
 ];
+const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
 const AGENT: &[&str] =
     &["name", "start", "goal", "start_velocity", "speed_max", "accel_max", "weight", "jammer", "dropout"];
 const SENSOR: &[&str] = &["name", "position", "track", "ranging", "detection", "jam"];
@@ -199,6 +200,7 @@ fn agents(top: &Table<'_>, dimension: usize) -> Outcome<Vec<AgentEntry>> {
             accel_max: table.number("accel_max")?,
             weight: table.number_or("weight", 1.0)?,
             jammer: jammer(table)?,
+            jammer_live: jammer_live(table)?,
             dropout: dropout(table)?,
         });
     }
@@ -206,8 +208,7 @@ fn agents(top: &Table<'_>, dimension: usize) -> Outcome<Vec<AgentEntry>> {
 }
 
 fn jammer(agent: &Table<'_>) -> Outcome<Option<Jammer<f64>>> {
-    let keys = &["pattern", "beam_width", "budget", "detection_model", "q"];
-    let Some(table) = agent.table("jammer", keys)? else { return Ok(None) };
+    let Some(table) = agent.table("jammer", JAMMER)? else { return Ok(None) };
     let patterns = [("isotropic", 0), ("cosine", 1), ("cone", 2)];
     let pattern = match table.choice("pattern", &patterns, Some(0))? {
         0 => BeamPattern::Isotropic,
@@ -225,6 +226,12 @@ fn jammer(agent: &Table<'_>) -> Outcome<Option<Jammer<f64>>> {
     // A number that the chosen model does not use must still be a number.
     table.number_optional("beam_width")?;
     Ok(Some(Jammer { pattern, betrayal, budget: table.number_or("budget", 0.0)? }))
+}
+
+/// Whether the scenario allows its jammer to be switched on in flight.
+fn jammer_live(agent: &Table<'_>) -> Outcome<bool> {
+    let Some(table) = agent.table("jammer", JAMMER)? else { return Ok(false) };
+    Ok(table.optional("live").map(|value| value.truth()).transpose()?.unwrap_or(false))
 }
 
 fn dropout(agent: &Table<'_>) -> Outcome<Option<Dropout<f64>>> {

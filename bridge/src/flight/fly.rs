@@ -1,0 +1,172 @@
+//! The flight itself: along the plan, to the next plan, and out of it.
+
+use crate::command::Command;
+use crate::mission::item::mission_items;
+use crate::mission::{Delivery, List, Watch};
+use crate::replan::job::{Rejected, judge, rest};
+use crate::replan::Answer;
+use crate::setpoint::Steering;
+use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
+
+use super::prepare::item_nodes;
+use super::settings::{FlyMode, OnFailure};
+use super::{End, Flight, Flying, Level, Output, Phase};
+
+/// Time after the last node in which a steered vehicle settles, s.
+const SETTLE: f64 = 2.0;
+/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
+const BEHIND: usize = 2;
+
+impl Flight {
+    pub(super) fn fly(&mut self, vehicle: &Vehicle) {
+        if self.telemetry.is_lost(self.now) {
+            // Nothing is steered blindly. The autopilot has its own answer to a bridge that it does not hear.
+            return;
+        }
+        if !vehicle.armed {
+            return self.end(End::Released("the vehicle was disarmed".into()));
+        }
+        if matches!(vehicle.flying, InAir::Ground | InAir::Landing) {
+            return self.end(End::Released("the vehicle lands".into()));
+        }
+        if vehicle.mode != self.own_mode() {
+            return self.end(End::Released(format!("the mode is {:?} now, and not by the bridge", vehicle.mode)));
+        }
+        if self.is_expired() {
+            return self.give_up("the plan is older than its time to live".into());
+        }
+        let time = self.scenario_time();
+        if let Some(next) = self.next.take_if(|next| next.curve.begin() <= time) {
+            self.say(Level::Info, format!("the plan of {:.1} s flies", next.curve.begin()));
+            self.flying = next;
+        }
+        match self.settings.mode {
+            FlyMode::Guided => {
+                let sample = self.flying.curve.sample(time);
+                self.steer(vehicle, &sample, Steering::Along);
+                if time > self.flying.curve.end() + SETTLE {
+                    return self.leave(Mode::Hold, End::Done);
+                }
+            }
+            FlyMode::Mission => {
+                self.advance_update(vehicle);
+                let goal = self.flying.curve.sample(self.flying.curve.end());
+                let is_last = self.item.is_some_and(|(item, _)| usize::from(item) + 1 >= self.flying.nodes.len());
+                if is_last && self.distance_m(vehicle, &goal.position) < self.settings.arrival_m {
+                    return self.end(End::Done);
+                }
+            }
+        }
+        self.plan_anew(time);
+    }
+
+    /// Time of the scenario by the item that the mission flies to, s: the clock runs between two nodes, and waits at the
+    /// second for the vehicle.
+    pub(super) fn mission_time(&self) -> f64 {
+        let times = self.flying.plan.node_times();
+        let begin = self.flying.curve.begin();
+        let Some((item, since)) = self.item else { return begin };
+        let node = self.flying.nodes.get(usize::from(item)).copied().unwrap_or_default();
+        let to = times.get(node).copied().unwrap_or(self.flying.curve.end());
+        let from = node.checked_sub(1).and_then(|node| times.get(node).copied()).unwrap_or(begin);
+        (from + self.now.since(since).as_secs_f64()).min(to)
+    }
+
+    fn plan_anew(&mut self, time: f64) {
+        let Some(replan) = self.settings.replan else { return };
+        let is_busy = self.job.is_some() || self.next.is_some() || self.update.is_some();
+        if is_busy || time - self.flying.made < replan.interval_s {
+            return;
+        }
+        let seam = time + replan.lead_s;
+        let at = self.flying.curve.sample(seam);
+        let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, seam, &at) else {
+            // Too little is left: the plan is good to its end.
+            self.flying.made = time;
+            return;
+        };
+        self.jobs += 1;
+        self.job = Some((Box::new(job.clone()), self.now));
+        self.out.push(Output::Plan(Box::new(job)));
+    }
+
+    pub(super) fn planned(&mut self, answer: &Answer) {
+        let Some((job, asked)) = self.job.take() else { return };
+        let time = self.scenario_time();
+        match judge(&job, answer, time, &self.flying.curve) {
+            Err(Rejected::Stale) => self.job = Some((job, asked)),
+            Err(why) => self.say(Level::Warn, format!("the plan for {:.1} s does not fly: {why}", job.seam)),
+            Ok((plan, curve)) if matches!(self.phase, Phase::Fly) => {
+                let next = Flying { plan, curve, made: time, nodes: Vec::new() };
+                match self.settings.mode {
+                    FlyMode::Guided => self.next = Some(next),
+                    FlyMode::Mission => self.begin_update(next),
+                }
+            }
+            Ok(_) => {}
+        }
+    }
+
+    /// Sends the rest of the mission by a new plan.
+    fn begin_update(&mut self, mut next: Flying) {
+        let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
+        let mut mission = match self.mission_of(&next.plan) {
+            Ok(mission) => mission,
+            Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
+        };
+        mission.items.drain(..BEHIND.min(mission.items.len()));
+        let items = mission_items(vehicle.autopilot, &mission);
+        next.nodes = item_nodes(&items, vehicle.autopilot == Autopilot::ArduPilot, 1);
+        let talk = self.talk(vehicle.identity, List::Mission);
+        self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
+        self.next = Some(next);
+    }
+
+    fn advance_update(&mut self, vehicle: &Vehicle) {
+        let Some(update) = &mut self.update else { return };
+        let mut out = Vec::new();
+        update.poll(self.now, &mut out);
+        let result = update.result();
+        self.send(out);
+        match result {
+            None => {}
+            Some(Ok(delivered)) => {
+                self.update = None;
+                self.watch = Some(Watch::new(self.talk(vehicle.identity, List::Mission), delivered));
+                // Autopilots disagree on what they keep: the item is always said. Item 0 of ArduPilot is home.
+                let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
+                self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
+                if let Some(next) = self.next.take() {
+                    self.flying = next;
+                    self.item = Some((first, self.now));
+                }
+                self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
+            }
+            Some(Err(failure)) => {
+                self.update = None;
+                self.next = None;
+                self.give_up(format!("the rest of the mission was not delivered: {failure}"));
+            }
+        }
+    }
+
+    /// Somebody else replaced the mission.
+    pub(super) fn lose_mission(&mut self) {
+        match self.phase {
+            Phase::Fly | Phase::Ready if self.settings.mode == FlyMode::Mission => {
+                self.end(End::Released("another station replaced the mission".into()));
+            }
+            _ => {}
+        }
+    }
+
+    /// There is no plan to fly any more.
+    fn give_up(&mut self, why: String) {
+        let is_steered = self.settings.mode == FlyMode::Guided;
+        match self.settings.on_failure {
+            OnFailure::Return => self.leave(Mode::Return, End::Failed(why)),
+            OnFailure::Continue if !is_steered => self.end(End::Failed(why)),
+            OnFailure::Hold | OnFailure::Continue => self.leave(Mode::Hold, End::Failed(why)),
+        }
+    }
+}

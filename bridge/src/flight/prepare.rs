@@ -1,0 +1,213 @@
+//! Before the flight: lists to the autopilot, and the way to the start.
+
+use std::time::Duration;
+
+use crate::clock::Time;
+use crate::file::mission::{Mission, missions};
+use crate::frame::{Altitude, Place};
+use crate::link::Frame;
+use crate::link::dialect::{MavCmd, MavMessage};
+use crate::mission::item::{fence_items, mission_items, rally_items};
+use crate::mission::{Delivery, Item, List, Watch, watch};
+use crate::setpoint::{Sample, Steering, target};
+use crate::telemetry::{Airframe, Autopilot, Flying as InAir, Mode, Vehicle};
+
+use super::settings::FlyMode;
+use super::{End, Flight, Level, Phase};
+
+/// Height above home from which on a vehicle that does not say so counts as flying, m.
+const HEIGHT_MIN: f64 = 1.0;
+/// How long setpoints are sent before the mode that follows them is asked for.
+const STREAM_FIRST: Duration = Duration::from_secs(1);
+/// Speed below which a vehicle has arrived, m/s.
+const SPEED_MAX: f64 = 1.0;
+
+/// For each item of a mission on the wire the node that it flies to.
+pub(super) fn item_nodes(items: &[Item], has_home: bool, first: usize) -> Vec<usize> {
+    let mut waypoints = 0;
+    let node = |(index, item): (usize, &Item)| {
+        let at = first + waypoints;
+        if item.command == MavCmd::MAV_CMD_NAV_WAYPOINT && !(has_home && index == 0) {
+            waypoints += 1;
+        }
+        at
+    };
+    items.iter().enumerate().map(node).collect()
+}
+
+impl Flight {
+    /// The mission of our agent in the plan that flies.
+    pub(super) fn mission_of(&self, plan: &crate::file::PlanFile) -> Result<Mission, String> {
+        let all = missions(&self.world, plan).map_err(|error| error.to_string())?;
+        all.into_iter().find(|mission| mission.agent == self.agent).ok_or_else(|| "has no such agent".to_owned())
+    }
+
+    pub(super) fn begin_delivery(&mut self, vehicle: &Vehicle) {
+        if self.settings.mode == FlyMode::Guided
+            && (vehicle.autopilot, vehicle.airframe) == (Autopilot::ArduPilot, Airframe::Plane)
+        {
+            let why = "ArduPlane does not follow setpoints along a path: fly it with --mode mission";
+            return self.end(End::Failed(why.into()));
+        }
+        let mission = match self.mission_of(&self.flying.plan) {
+            Ok(mission) => mission,
+            Err(why) => return self.end(End::Failed(why)),
+        };
+        let mut waiting = Vec::new();
+        if self.settings.mode == FlyMode::Mission {
+            let items = mission_items(vehicle.autopilot, &mission);
+            self.flying.nodes = item_nodes(&items, vehicle.autopilot == Autopilot::ArduPilot, 0);
+            waiting.push((List::Mission, items));
+        }
+        if self.settings.rally {
+            let start = self.frame.place(&self.flying.curve.sample(self.flying.curve.begin()).position);
+            waiting.push((List::Rally, rally_items(&[above_home(start, vehicle)])));
+        }
+        if self.settings.fence {
+            waiting.push((List::Fence, fence_items(&mission.fences)));
+        }
+        self.next_delivery(vehicle, waiting);
+    }
+
+    fn next_delivery(&mut self, vehicle: &Vehicle, mut waiting: Vec<(List, Vec<Item>)>) {
+        let Some((list, items)) = waiting.pop() else {
+            self.say(Level::Info, "ready: arm, take off, and it begins");
+            self.phase = Phase::Ready;
+            return;
+        };
+        let talk = self.talk(vehicle.identity, list);
+        let delivery = Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace()));
+        self.phase = Phase::Deliver { delivery, waiting };
+    }
+
+    pub(super) fn advance_delivery(&mut self, vehicle: &Vehicle) {
+        let Phase::Deliver { delivery, waiting } = &mut self.phase else { return };
+        let mut out = Vec::new();
+        delivery.poll(self.now, &mut out);
+        let (list, result, waiting) = (delivery.list(), delivery.result(), waiting.clone());
+        self.send(out);
+        match result {
+            None => {}
+            Some(Ok(delivered)) => {
+                self.say(Level::Info, format!("the autopilot holds the {list}: {} items", delivered.count));
+                if list == List::Mission {
+                    self.watch = Some(Watch::new(self.talk(vehicle.identity, list), delivered));
+                }
+                self.next_delivery(vehicle, waiting);
+            }
+            Some(Err(failure)) => self.end(End::Failed(format!("the {list} was not delivered: {failure}"))),
+        }
+    }
+
+    pub(super) fn wait_for_flight(&mut self, vehicle: &Vehicle) {
+        let is_high = vehicle.fix.is_some_and(|fix| fix.above_home_m > HEIGHT_MIN);
+        let is_flying = match vehicle.flying {
+            InAir::Air => true,
+            InAir::Unknown => is_high,
+            InAir::Ground | InAir::Landing => false,
+        };
+        if !vehicle.armed || !is_flying {
+            return;
+        }
+        match self.settings.mode {
+            FlyMode::Guided => {
+                self.say(Level::Info, "in the air: flying to the start");
+                self.phase = Phase::Approach { since: self.now };
+            }
+            FlyMode::Mission if vehicle.mode == Mode::Mission => self.take_off(),
+            FlyMode::Mission => {}
+        }
+    }
+
+    /// The plan begins now.
+    fn take_off(&mut self) {
+        self.say(Level::Info, "flying the plan");
+        self.zero = Some(self.now);
+        self.flying.made = self.flying.curve.begin();
+        self.phase = Phase::Fly;
+    }
+
+    pub(super) fn approach(&mut self, vehicle: &Vehicle, since: Time) {
+        if !vehicle.armed {
+            return self.end(End::Released("the vehicle was disarmed".into()));
+        }
+        if self.telemetry.is_lost(self.now) {
+            return;
+        }
+        let start = self.flying.curve.sample(self.flying.curve.begin());
+        let start = Sample::rest(&start.position);
+        self.steer(vehicle, &start, Steering::To);
+        if self.now.since(since) < STREAM_FIRST {
+            return;
+        }
+        self.ask_for(vehicle, Mode::Guided);
+        let is_slow = vehicle.fix.is_some_and(|fix| fix.velocity.iter().all(|part| part.abs() < SPEED_MAX));
+        if vehicle.mode == Mode::Guided && is_slow && self.distance_m(vehicle, &start.position) < self.settings.arrival_m {
+            self.take_off();
+        }
+    }
+
+    /// Distance from a position, m; infinite where the vehicle does not say where it is.
+    pub(super) fn distance_m(&self, vehicle: &Vehicle, position: &[f64]) -> f64 {
+        let Some(fix) = vehicle.fix else { return f64::INFINITY };
+        let wanted = self.frame.place(position);
+        let Some(at) = self.frame.position(&fix.place) else { return f64::INFINITY };
+        let unit = self.frame.unit_m();
+        let level = at.iter().zip(position).take(2).map(|(a, b)| ((a - b) * unit).powi(2)).sum::<f64>().sqrt();
+        let height = match wanted.altitude {
+            Altitude::AboveHome(meters) => fix.above_home_m - meters,
+            Altitude::AboveSeaLevel(meters) => fix.place.altitude.meters() - meters,
+        };
+        level.hypot(height)
+    }
+
+    /// A setpoint, when it is time for one.
+    pub(super) fn steer(&mut self, vehicle: &Vehicle, sample: &Sample, steering: Steering) {
+        if self.setpoint.is_some_and(|sent| self.now.since(sent) < self.settings.setpoint_interval()) {
+            return;
+        }
+        self.setpoint = Some(self.now);
+        match target(self.now, vehicle.identity, &self.frame, sample, steering) {
+            Some(message) => self.send(vec![message]),
+            None => self.say(Level::Warn, "a setpoint was not finite, and was not sent"),
+        }
+    }
+
+    /// Setpoints to where the vehicle is: for as long as it is asked to leave the mode that needs them.
+    pub(super) fn stay(&mut self, vehicle: &Vehicle) {
+        if self.settings.mode == FlyMode::Mission {
+            return;
+        }
+        if let Some(position) = vehicle.fix.and_then(|fix| self.frame.position(&fix.place)) {
+            self.steer(vehicle, &Sample::rest(&position), Steering::To);
+        }
+    }
+
+    /// Takes note of where the mission is, and of others who replace it.
+    pub(super) fn follow_mission(&mut self, frame: &Frame) {
+        if let (MavMessage::MISSION_CURRENT(data), Phase::Fly) = (&frame.message, &self.phase)
+            && self.telemetry.vehicle().is_some_and(|vehicle| vehicle.identity == frame.from)
+            && self.item.is_none_or(|(item, _)| item != data.seq)
+        {
+            self.item = Some((data.seq, self.now));
+        }
+        // Our own transfer looks like somebody else's while it goes on.
+        if self.update.is_some() {
+            return;
+        }
+        if self.watch.as_mut().and_then(|watch| watch.handle(frame)) == Some(watch::Sign::Replaced) {
+            self.watch = None;
+            self.lose_mission();
+        }
+    }
+}
+
+/// A place with an altitude above home.
+fn above_home(place: Place, vehicle: &Vehicle) -> Place {
+    let home = vehicle.fix.map_or(0.0, |fix| fix.place.altitude.meters() - fix.above_home_m);
+    let altitude = match place.altitude {
+        Altitude::AboveHome(meters) => meters,
+        Altitude::AboveSeaLevel(meters) => meters - home,
+    };
+    Place { altitude: Altitude::AboveHome(altitude), ..place }
+}

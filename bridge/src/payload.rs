@@ -1,0 +1,224 @@
+//! Transmit power and jamming, relayed to payloads.
+//!
+//! Payloads are components of the vehicle with two commands of their own:
+//!
+//! | command | parameter 1 | 2 | 3 | 4 | 5 |
+//! |---|---|---|---|---|---|
+//! | `MAV_CMD_USER_1`, transmit power | instance | fraction of full power, 0 to 1 | time to live, s | | |
+//! | `MAV_CMD_USER_2`, jamming | instance | level, 0 to 1 | azimuth, degrees clockwise from north | elevation, degrees | time to live, s |
+//!
+//! Each is repeated every [`REFRESH`] with a time to live: a payload that hears nothing for that long falls silent, or
+//! goes back to full power, by itself. The answer is taken note of, and not waited for: the next repetition is the
+//! resend.
+//!
+//! **Radiating.** No jamming command leaves the bridge unless [`Radiation::Armed`], which needs both the switch on the
+//! command line and the word of the scenario. And then: whoever calls [`Relay::poll`] without an emission gets level 0
+//! sent. There is no state in which an old level is repeated.
+
+use std::time::Duration;
+
+use crate::clock::Time;
+use crate::command::Command;
+use crate::link::dialect::{MavCmd, MavMessage, MavResult};
+use crate::link::{Frame, Identity};
+
+/// How often payloads hear from the bridge.
+pub const REFRESH: Duration = Duration::from_millis(250);
+/// How long a payload goes on without hearing from the bridge, s.
+pub const TIME_TO_LIVE_S: f32 = 1.0;
+
+/// What a payload does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A transmitter whose power can be turned down.
+    Transmitter,
+    /// A jammer.
+    Jammer,
+}
+
+/// A payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Payload {
+    /// What it does.
+    pub kind: Kind,
+    /// Its component id on the vehicle.
+    pub component: u8,
+    /// Its number on that component.
+    pub instance: u8,
+}
+
+/// Whether anything may be jammed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Radiation {
+    /// No jamming command is ever sent.
+    #[default]
+    Off,
+    /// The switch and the scenario both allow it.
+    Armed,
+}
+
+/// What to emit now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Jamming level, 0 to 1.
+    pub level: f64,
+    /// Jamming direction, rad, counter-clockwise from east.
+    pub azimuth: f64,
+    /// Reduction of the transmit power, 0 to 1.
+    pub dropout: f64,
+}
+
+/// Tells payloads what to do. See the [module](self).
+#[derive(Clone, Debug)]
+pub struct Relay {
+    payloads: Vec<Payload>,
+    radiation: Radiation,
+    sent: Option<Time>,
+    last: Option<Emission>,
+    /// When each payload last accepted a command.
+    accepted: Vec<Option<Time>>,
+}
+
+impl Relay {
+    /// A relay to some payloads.
+    #[must_use]
+    pub fn new(payloads: Vec<Payload>, radiation: Radiation) -> Self {
+        let accepted = vec![None; payloads.len()];
+        Self { payloads, radiation, sent: None, last: None, accepted }
+    }
+
+    /// Whether every payload that hears from the bridge has answered within `span`.
+    #[must_use]
+    pub fn is_heard(&self, now: Time, span: Duration) -> bool {
+        self.accepted.iter().all(|accepted| accepted.is_some_and(|at| now.since(at) <= span))
+    }
+
+    /// What is being emitted; `None` for nothing.
+    #[must_use]
+    pub const fn emission(&self) -> Option<Emission> {
+        self.last
+    }
+
+    /// Takes a message of the link.
+    pub fn handle(&mut self, now: Time, frame: &Frame) {
+        let MavMessage::COMMAND_ACK(ack) = &frame.message else { return };
+        for (payload, accepted) in self.payloads.iter().zip(&mut self.accepted) {
+            let command = match payload.kind {
+                Kind::Transmitter => MavCmd::MAV_CMD_USER_1,
+                Kind::Jammer => MavCmd::MAV_CMD_USER_2,
+            };
+            if frame.from.component == payload.component && ack.command == command {
+                *accepted = (ack.result == MavResult::MAV_RESULT_ACCEPTED).then_some(now);
+            }
+        }
+    }
+
+    /// Sends what is due. Without an emission, or with one that is not finite: level 0 and full power.
+    ///
+    /// A change to nothing, or from nothing, does not wait for the next repetition.
+    pub fn poll(&mut self, now: Time, vehicle: Identity, emission: Option<Emission>, out: &mut Vec<MavMessage>) {
+        let is_finite = |emission: &Emission| {
+            [emission.level, emission.azimuth, emission.dropout].iter().all(|number| number.is_finite())
+        };
+        let emission = emission.filter(is_finite);
+        let is_change = emission != self.last;
+        if !is_change && self.sent.is_some_and(|sent| now.since(sent) < REFRESH) {
+            return;
+        }
+        (self.sent, self.last) = (Some(now), emission);
+        self.speak(vehicle, emission, out);
+    }
+
+    /// Level 0 and full power, at once: for the moment before everything ends.
+    pub fn silence(&mut self, vehicle: Identity, out: &mut Vec<MavMessage>) {
+        self.last = None;
+        self.speak(vehicle, None, out);
+    }
+
+    fn speak(&self, vehicle: Identity, emission: Option<Emission>, out: &mut Vec<MavMessage>) {
+        for payload in &self.payloads {
+            let to = Identity { system: vehicle.system, component: payload.component };
+            let instance = f32::from(payload.instance);
+            let command = match payload.kind {
+                Kind::Transmitter => {
+                    let power = 1.0 - emission.map_or(0.0, |emission| emission.dropout.clamp(0.0, 1.0));
+                    let params = [instance, power as f32, TIME_TO_LIVE_S, 0.0, 0.0, 0.0, 0.0];
+                    Command::new(MavCmd::MAV_CMD_USER_1, params)
+                }
+                Kind::Jammer if self.radiation == Radiation::Off => continue,
+                Kind::Jammer => {
+                    let (level, azimuth) =
+                        emission.map_or((0.0, 0.0), |emission| (emission.level.clamp(0.0, 1.0), emission.azimuth));
+                    let compass = (90.0 - azimuth.to_degrees()).rem_euclid(360.0);
+                    let params = [instance, level as f32, compass as f32, 0.0, TIME_TO_LIVE_S, 0.0, 0.0];
+                    Command::new(MavCmd::MAV_CMD_USER_2, params)
+                }
+            };
+            out.push(command.long(to, 0));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VEHICLE: Identity = Identity { system: 1, component: 1 };
+    const JAM: Emission = Emission { level: 0.5, azimuth: 0.0, dropout: 0.25 };
+
+    fn relay(radiation: Radiation) -> Relay {
+        let transmitter = Payload { kind: Kind::Transmitter, component: 25, instance: 1 };
+        Relay::new(vec![transmitter, Payload { kind: Kind::Jammer, component: 26, instance: 2 }], radiation)
+    }
+
+    fn levels(out: &[MavMessage]) -> Vec<(u32, [f32; 5])> {
+        let level = |message: &MavMessage| match message {
+            MavMessage::COMMAND_LONG(data) => {
+                (data.command as u32, [data.param1, data.param2, data.param3, data.param4, data.param5])
+            }
+            other => panic!("{other:?}"),
+        };
+        out.iter().map(level).collect()
+    }
+
+    #[test]
+    fn emissions_are_repeated_and_nothing_means_level_0_at_once() {
+        let mut relay = relay(Radiation::Armed);
+        let mut out = Vec::new();
+        for tick in 0..10 {
+            relay.poll(Time::from_millis(tick * 100), VEHICLE, Some(JAM), &mut out);
+        }
+        let (power, jam) = ((31010, [1.0, 0.75, 1.0, 0.0, 0.0]), (31011, [2.0, 0.5, 90.0, 0.0, 1.0]));
+        assert_eq!(levels(&out), [power, jam, power, jam, power, jam, power, jam]);
+        out.clear();
+        relay.poll(Time::from_millis(901), VEHICLE, None, &mut out);
+        let off = [(31010, [1.0, 1.0, 1.0, 0.0, 0.0]), (31011, [2.0, 0.0, 90.0, 0.0, 1.0])];
+        assert_eq!(levels(&out), off);
+        out.clear();
+        relay.poll(Time::from_millis(902), VEHICLE, Some(Emission { level: f64::NAN, ..JAM }), &mut out);
+        assert_eq!(out, [], "not a number is nothing, and nothing has been said");
+        relay.poll(Time::from_millis(1200), VEHICLE, Some(Emission { level: f64::NAN, ..JAM }), &mut out);
+        assert_eq!(levels(&out), off);
+    }
+
+    #[test]
+    fn unarmed_no_jamming_command_leaves_at_all() {
+        let mut relay = relay(Radiation::Off);
+        let mut out = Vec::new();
+        relay.poll(Time::ZERO, VEHICLE, Some(JAM), &mut out);
+        relay.poll(Time::from_millis(1), VEHICLE, None, &mut out);
+        relay.silence(VEHICLE, &mut out);
+        assert!(levels(&out).iter().all(|(command, _)| *command == 31010), "{out:?}");
+        assert_eq!(out.len(), 3);
+    }
+
+    #[test]
+    fn levels_stay_between_0_and_1_and_azimuths_on_the_compass() {
+        let mut relay = relay(Radiation::Armed);
+        let mut out = Vec::new();
+        let azimuth = std::f64::consts::PI;
+        relay.poll(Time::ZERO, VEHICLE, Some(Emission { level: 7.0, azimuth, dropout: -1.0 }), &mut out);
+        assert_eq!(levels(&out)[0].1[1], 1.0);
+        assert_eq!(levels(&out)[1].1[1..3], [1.0, 270.0]);
+    }
+}

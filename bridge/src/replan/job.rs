@@ -1,0 +1,170 @@
+//! The problem of the rest of the flight, and when its answer may fly.
+//!
+//! A plan takes time to make, so it is made for a time ahead: the *seam*, `lead` from now. The rest of the flight begins
+//! there with the position and velocity that the flying plan has then, keeps the length of the intervals, and drops the
+//! nodes that are flown. The tail of the flying plan is where the planner starts from, so its answer is no worse.
+//!
+//! Limits: one agent.
+
+use serde::{Deserialize, Serialize};
+
+use crate::file::scenario::ScenarioFile;
+use crate::file::{PlanFile, plan::AgentPlan};
+use crate::setpoint::{Curve, Sample};
+
+/// Intervals below which the rest is not worth planning anew.
+const INTERVALS_MIN: usize = 4;
+/// How far a plan may begin from where the flying plan is at the seam, as a share of the way flown in one of its
+/// intervals.
+const SEAM_TOLERANCE: f64 = 0.05;
+/// Budgets below this are none, s.
+const BUDGET_MIN: f64 = 1e-9;
+
+/// A problem for the planner.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Counts up; an answer names its job.
+    pub number: u64,
+    /// The rest of the flight.
+    pub scenario: ScenarioFile,
+    /// The tail of the flying plan.
+    pub tail: PlanFile,
+    /// When it takes over, s of the scenario.
+    pub seam: f64,
+}
+
+/// What came out of a job.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// The job's number.
+    pub number: u64,
+    /// The plan and whether it is feasible, or why there is none.
+    pub result: Result<(PlanFile, bool), String>,
+}
+
+/// Why a plan may not fly.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Rejected {
+    /// It is not the answer to the last question.
+    Stale,
+    /// There is no plan.
+    Failed(String),
+    /// It breaks a constraint.
+    Infeasible,
+    /// It holds numbers that are not finite, or has no shape.
+    Malformed,
+    /// The seam has passed.
+    Late,
+    /// It does not begin where the vehicle is going to be.
+    Elsewhere,
+}
+
+impl std::fmt::Display for Rejected {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stale => f.write_str("it answers an earlier question"),
+            Self::Failed(why) => write!(f, "the planner failed: {why}"),
+            Self::Infeasible => f.write_str("it breaks a constraint"),
+            Self::Malformed => f.write_str("it holds numbers that are not finite"),
+            Self::Late => f.write_str("it came after the time at which it was to take over"),
+            Self::Elsewhere => f.write_str("it does not begin where the vehicle is going to be"),
+        }
+    }
+}
+
+/// The rest of a flight from the seam on; `None` where too little is left to plan.
+///
+/// `world` is the scenario as it is known now; `at` is where the vehicle is going to be at the seam.
+#[must_use]
+pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64, at: &Sample) -> Option<Job> {
+    let times = flying.node_times();
+    let last = times.last().copied()?;
+    let first_left = times.iter().position(|time| *time > seam)?;
+    let intervals = times.len().checked_sub(first_left)?;
+    if intervals < INTERVALS_MIN {
+        return None;
+    }
+    let agent_plan = flying.agents.first()?;
+    let curve = Curve::of(flying, &agent_plan.name)?;
+    let mut scenario = world.clone();
+    scenario.start_time = seam;
+    scenario.intervals = intervals;
+    let interval = (last - seam) / intervals as f64;
+    let node_time = |node: usize| seam + interval * node as f64;
+    let agent = scenario.agents.first_mut()?;
+    agent.start.clone_from(&at.position);
+    agent.start_velocity = Some(at.velocity.clone());
+    if let Some(jammer) = &mut agent.jammer {
+        jammer.budget = left(jammer.budget, &times, agent_plan.jam.as_deref(), seam);
+    }
+    if let Some(dropout) = &mut agent.dropout {
+        dropout.budget = left(dropout.budget, &times, agent_plan.dropout.as_deref(), seam);
+    }
+    let mut path: Vec<Vec<f64>> = (0..=intervals).map(|node| curve.sample(node_time(node)).position).collect();
+    path.first_mut()?.clone_from(&at.position);
+    path.last_mut()?.clone_from(&agent.goal);
+    let control = |values: &Option<Vec<f64>>| {
+        values.as_ref().map(|values| {
+            let at = |node: usize| step_value(&times, values, node_time(node));
+            (0..=intervals).map(at).collect()
+        })
+    };
+    let agents = vec![AgentPlan {
+        name: agent_plan.name.clone(),
+        path,
+        jam: control(&agent_plan.jam),
+        azimuth: control(&agent_plan.azimuth),
+        dropout: control(&agent_plan.dropout),
+    }];
+    let duration = last - seam;
+    let tail =
+        PlanFile { scenario: flying.scenario.clone(), start_time: seam, duration, agents, ..PlanFile::default() };
+    Some(Job { number, scenario, tail, seam })
+}
+
+/// The value of a control at a time: that of the node at the end of the interval, as the integrals count it.
+#[must_use]
+pub fn step_value(times: &[f64], values: &[f64], time: f64) -> f64 {
+    let node = times.iter().position(|node| *node >= time).unwrap_or(values.len().saturating_sub(1));
+    values.get(node).copied().unwrap_or_default()
+}
+
+/// What is left of a budget at the seam.
+fn left(budget: f64, times: &[f64], values: Option<&[f64]>, seam: f64) -> f64 {
+    let spent: f64 = (times.iter().zip(times.iter().skip(1)))
+        .zip(values.unwrap_or_default().iter().skip(1))
+        .map(|((from, to), value)| (to.min(seam) - from).max(0.0) * value)
+        .sum();
+    let left = (budget - spent).max(0.0);
+    if left < BUDGET_MIN { 0.0 } else { left }
+}
+
+/// The curve of a plan that may fly.
+///
+/// # Errors
+/// Why it may not. The flying plan goes on.
+pub fn judge(asked: &Job, answer: &Answer, now: f64, flying: &Curve) -> Result<(PlanFile, Curve), Rejected> {
+    if answer.number != asked.number {
+        return Err(Rejected::Stale);
+    }
+    let (plan, feasible) = answer.result.as_ref().map_err(|why| Rejected::Failed(why.clone()))?;
+    let agent = plan.agents.first().ok_or(Rejected::Malformed)?;
+    let controls = [&agent.jam, &agent.azimuth, &agent.dropout];
+    if !controls.into_iter().flatten().flatten().all(|number| number.is_finite()) {
+        return Err(Rejected::Malformed);
+    }
+    let curve = Curve::of(plan, &agent.name).ok_or(Rejected::Malformed)?;
+    if !feasible {
+        return Err(Rejected::Infeasible);
+    }
+    if now > asked.seam {
+        return Err(Rejected::Late);
+    }
+    let (there, here) = (curve.sample(asked.seam), flying.sample(asked.seam));
+    let start = asked.scenario.agents.first().map(|agent| agent.start.as_slice()).unwrap_or_default();
+    let far = |from: &[f64]| from.iter().zip(&there.position).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let interval = (curve.end() - curve.begin()) / plan.nodes().max(2) as f64;
+    let speed = asked.scenario.agents.first().map_or(0.0, |agent| agent.speed_max);
+    let is_here = far(start) <= SEAM_TOLERANCE * speed * interval && there.position.len() == here.position.len();
+    if is_here && (curve.begin() - asked.seam).abs() < 1e-6 { Ok((plan.clone(), curve)) } else { Err(Rejected::Elsewhere) }
+}
