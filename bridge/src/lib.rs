@@ -11,6 +11,7 @@
 //! | [`link`] | MAVLink over serial lines, datagrams, streams, or a wire in memory |
 //! | [`mission`] | missions on their way to an autopilot and back |
 //! | [`payload`] | transmit power and jamming, relayed to payloads |
+//! | [`record`] | the record of a flight, and its replay |
 //! | [`replan`] | planning anew in flight: observations in, plans out |
 //! | [`setpoint`] | a plan, steered live |
 //! | [`telemetry`] | what the vehicle says about itself |
@@ -26,6 +27,7 @@ pub mod link;
 pub mod mission;
 pub mod payload;
 pub mod planning;
+pub mod record;
 pub mod replan;
 pub mod setpoint;
 pub mod telemetry;

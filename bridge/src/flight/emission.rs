@@ -33,7 +33,10 @@ impl Flight {
             return None;
         }
         let control = |values: &Option<Vec<f64>>| {
-            values.as_deref().filter(|values| !values.is_empty()).map_or(0.0, |values| step_value(&times, values, time))
+            values
+                .as_deref()
+                .filter(|values| !values.is_empty())
+                .map_or(0.0, |values| step_value(&times, values, time))
         };
         Some(Emission { level: control(&plan.jam), azimuth: control(&plan.azimuth), dropout: control(&plan.dropout) })
     }

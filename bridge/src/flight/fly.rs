@@ -3,8 +3,8 @@
 use crate::command::Command;
 use crate::mission::item::mission_items;
 use crate::mission::{Delivery, List, Watch};
-use crate::replan::job::{Rejected, judge, rest};
 use crate::replan::Answer;
+use crate::replan::job::{Rejected, judge, rest};
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -123,16 +123,16 @@ impl Flight {
     }
 
     fn advance_update(&mut self, vehicle: &Vehicle) {
-        let Some(update) = &mut self.update else { return };
+        let Some(mut update) = self.update.take() else { return };
         let mut out = Vec::new();
         update.poll(self.now, &mut out);
         let result = update.result();
         self.send(out);
         match result {
-            None => {}
+            None => self.update = Some(update),
             Some(Ok(delivered)) => {
-                self.update = None;
-                self.watch = Some(Watch::new(self.talk(vehicle.identity, List::Mission), delivered));
+                let kept = update.items().to_vec();
+                self.watch_over(Watch::new(self.talk(vehicle.identity, List::Mission), delivered), kept);
                 // Autopilots disagree on what they keep: the item is always said. Item 0 of ArduPilot is home.
                 let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
                 self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
@@ -143,20 +143,9 @@ impl Flight {
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
             }
             Some(Err(failure)) => {
-                self.update = None;
                 self.next = None;
                 self.give_up(format!("the rest of the mission was not delivered: {failure}"));
             }
-        }
-    }
-
-    /// Somebody else replaced the mission.
-    pub(super) fn lose_mission(&mut self) {
-        match self.phase {
-            Phase::Fly | Phase::Ready if self.settings.mode == FlyMode::Mission => {
-                self.end(End::Released("another station replaced the mission".into()));
-            }
-            _ => {}
         }
     }
 

@@ -25,6 +25,7 @@
 
 mod emission;
 mod fly;
+mod guard;
 mod prepare;
 pub mod settings;
 
@@ -39,7 +40,7 @@ use crate::frame::LocalFrame;
 use crate::link::codec::companion_heartbeat;
 use crate::link::dialect::MavMessage;
 use crate::link::{Frame, Identity};
-use crate::mission::{Delivery, Item, List, Pace, Talk, Watch};
+use crate::mission::{Delivery, Download, Item, List, Pace, Talk, Watch};
 use crate::payload::Relay;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
@@ -152,6 +153,9 @@ pub struct Flight {
     round_trip: Option<Duration>,
     relay: Relay,
     watch: Option<Watch>,
+    /// What the autopilot holds of ours, and a look whether it still does.
+    kept: Vec<Item>,
+    check: Option<Download>,
     phase: Phase,
     flying: Flying,
     next: Option<Flying>,
@@ -180,12 +184,19 @@ impl Flight {
         let fail = |message: String, help: &str| FileError::whole(scenario.file_name(), message, help);
         plan.fits("the plan", scenario)?;
         let frame = LocalFrame::of(scenario).ok_or_else(|| {
-            fail("does not say where on the Earth it lies".into(), "add latitude_deg, longitude_deg and altitude_m to [frame]")
+            fail(
+                "does not say where on the Earth it lies".into(),
+                "add latitude_deg, longitude_deg and altitude_m to [frame]",
+            )
         })?;
         let names: Vec<&str> = scenario.agents.iter().map(|agent| agent.name.as_str()).collect();
-        let agent = settings.agent.clone().or_else(|| names.first().map(|name| (*name).to_owned())).unwrap_or_default();
+        let agent =
+            settings.agent.clone().or_else(|| names.first().map(|name| (*name).to_owned())).unwrap_or_default();
         let Some(entry) = scenario.agents.iter().find(|entry| entry.name == agent) else {
-            return Err(Box::new(fail(format!("has no agent `{agent}`"), &format!("its agents are {}", names.join(", ")))));
+            return Err(Box::new(fail(
+                format!("has no agent `{agent}`"),
+                &format!("its agents are {}", names.join(", ")),
+            )));
         };
         if settings.replan.is_some() && scenario.agents.len() > 1 {
             let message = format!("has {} agents, and planning anew in flight plans for one", scenario.agents.len());
@@ -210,6 +221,8 @@ impl Flight {
             round_trip: None,
             relay,
             watch: None,
+            kept: Vec::new(),
+            check: None,
             phase: Phase::Connect,
             flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new() },
             next: None,
@@ -402,6 +415,7 @@ impl Flight {
         for ended in unanswered {
             self.say(Level::Warn, format!("{:?} was not answered", ended.command.command));
         }
+        self.advance_check(&vehicle);
         self.advance_phase(&vehicle);
         if matches!(self.phase, Phase::Ended) {
             return;

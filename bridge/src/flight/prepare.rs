@@ -8,7 +8,7 @@ use crate::frame::{Altitude, Place};
 use crate::link::Frame;
 use crate::link::dialect::{MavCmd, MavMessage};
 use crate::mission::item::{fence_items, mission_items, rally_items};
-use crate::mission::{Delivery, Item, List, Watch, watch};
+use crate::mission::{Delivery, Item, List, Watch};
 use crate::setpoint::{Sample, Steering, target};
 use crate::telemetry::{Airframe, Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -85,13 +85,14 @@ impl Flight {
         let mut out = Vec::new();
         delivery.poll(self.now, &mut out);
         let (list, result, waiting) = (delivery.list(), delivery.result(), waiting.clone());
+        let kept = delivery.items().to_vec();
         self.send(out);
         match result {
             None => {}
             Some(Ok(delivered)) => {
                 self.say(Level::Info, format!("the autopilot holds the {list}: {} items", delivered.count));
                 if list == List::Mission {
-                    self.watch = Some(Watch::new(self.talk(vehicle.identity, list), delivered));
+                    self.watch_over(Watch::new(self.talk(vehicle.identity, list), delivered), kept);
                 }
                 self.next_delivery(vehicle, waiting);
             }
@@ -142,7 +143,10 @@ impl Flight {
         }
         self.ask_for(vehicle, Mode::Guided);
         let is_slow = vehicle.fix.is_some_and(|fix| fix.velocity.iter().all(|part| part.abs() < SPEED_MAX));
-        if vehicle.mode == Mode::Guided && is_slow && self.distance_m(vehicle, &start.position) < self.settings.arrival_m {
+        if vehicle.mode == Mode::Guided
+            && is_slow
+            && self.distance_m(vehicle, &start.position) < self.settings.arrival_m
+        {
             self.take_off();
         }
     }
@@ -191,14 +195,7 @@ impl Flight {
         {
             self.item = Some((data.seq, self.now));
         }
-        // Our own transfer looks like somebody else's while it goes on.
-        if self.update.is_some() {
-            return;
-        }
-        if self.watch.as_mut().and_then(|watch| watch.handle(frame)) == Some(watch::Sign::Replaced) {
-            self.watch = None;
-            self.lose_mission();
-        }
+        self.watch_mission(frame);
     }
 }
 

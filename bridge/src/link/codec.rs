@@ -156,6 +156,12 @@ pub(super) fn plain(from: Identity, sequence: u8, message: &MavMessage) -> MAVLi
     raw
 }
 
+/// The bytes of a message as an unsigned frame with sequence number 0.
+#[must_use]
+pub fn plain_bytes(from: Identity, message: &MavMessage) -> Vec<u8> {
+    plain(from, 0, message).raw_bytes().to_vec()
+}
+
 /// A message as a MAVLink 2 frame whose signature is yet to be filled in.
 pub(super) fn signable(from: Identity, sequence: u8, message: &MavMessage) -> MAVLinkV2MessageRaw {
     let mut raw = MAVLinkV2MessageRaw::new();

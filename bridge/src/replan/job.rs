@@ -166,5 +166,9 @@ pub fn judge(asked: &Job, answer: &Answer, now: f64, flying: &Curve) -> Result<(
     let interval = (curve.end() - curve.begin()) / plan.nodes().max(2) as f64;
     let speed = asked.scenario.agents.first().map_or(0.0, |agent| agent.speed_max);
     let is_here = far(start) <= SEAM_TOLERANCE * speed * interval && there.position.len() == here.position.len();
-    if is_here && (curve.begin() - asked.seam).abs() < 1e-6 { Ok((plan.clone(), curve)) } else { Err(Rejected::Elsewhere) }
+    if is_here && (curve.begin() - asked.seam).abs() < 1e-6 {
+        Ok((plan.clone(), curve))
+    } else {
+        Err(Rejected::Elsewhere)
+    }
 }

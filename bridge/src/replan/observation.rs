@@ -182,14 +182,20 @@ impl Observation {
             return Ok(());
         }
         if ranging.is_none() && detection.is_none() {
-            return Err(format!("`{}` is no sensor of the scenario, and says nothing of `ranging` or `detection`", self.id));
+            return Err(format!(
+                "`{}` is no sensor of the scenario, and says nothing of `ranging` or `detection`",
+                self.id
+            ));
         }
-        let (name, jam) = (self.id.clone(), quietpath_core::scenario::Susceptibility {
-            error_gain: 0.0,
-            error_exponent: 2.0,
-            detect_gain: 0.0,
-            detect_exponent: 2.0,
-        });
+        let (name, jam) = (
+            self.id.clone(),
+            quietpath_core::scenario::Susceptibility {
+                error_gain: 0.0,
+                error_exponent: 2.0,
+                detect_gain: 0.0,
+                detect_exponent: 2.0,
+            },
+        );
         scenario.sensors.push(SensorEntry { name, motion, ranging, detection, jam });
         Ok(())
     }
@@ -287,7 +293,10 @@ mod tests {
                 format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[0.3, 0], [0, 0.3]]}}"),
                 "is uncertain by 0.775, more than 0.5",
             ),
-            (format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[1], []]}}"), "covariance that is none"),
+            (
+                format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[1], []]}}"),
+                "covariance that is none",
+            ),
         ];
         for (line, says) in cases {
             let error = apply(&line).expect_err(says);

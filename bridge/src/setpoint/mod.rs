@@ -51,7 +51,8 @@ pub fn target(
         return None;
     }
     let place = frame.place(&sample.position);
-    let meters = |vector: &[f64], axis: usize| (vector.get(axis).copied().unwrap_or_default() * frame.unit_m()) as f32;
+    let meters =
+        |vector: &[f64], axis: usize| (vector.get(axis).copied().unwrap_or_default() * frame.unit_m()) as f32;
     #[expect(deprecated, reason = "autopilots know these names")]
     let (coordinate_frame, altitude) = match place.altitude {
         Altitude::AboveHome(meters) => (MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, meters),

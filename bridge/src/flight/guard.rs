@@ -1,0 +1,65 @@
+//! Whether the autopilot still holds our mission.
+//!
+//! A sign that somebody else sent one is looked into by reading the mission back; only a mission that differs ends the
+//! flight.
+
+use crate::link::Frame;
+use crate::link::dialect::MavMessage;
+use crate::mission::item::first_difference;
+use crate::mission::{Download, Item, List, Watch, watch};
+use crate::telemetry::Vehicle;
+
+use super::settings::FlyMode;
+use super::{End, Flight, Level, Phase};
+
+impl Flight {
+    /// From now on this mission is ours.
+    pub(super) fn watch_over(&mut self, watch: Watch, kept: Vec<Item>) {
+        (self.watch, self.kept, self.check) = (Some(watch), kept, None);
+    }
+
+    pub(super) fn watch_mission(&mut self, frame: &Frame) {
+        // Our own transfer looks like somebody else's while it goes on.
+        if self.update.is_some() {
+            return;
+        }
+        let mut out = Vec::new();
+        if let Some(check) = &mut self.check {
+            check.handle(self.now, frame, &mut out);
+        }
+        self.send(out);
+        match self.watch.as_mut().and_then(|watch| watch.handle(frame)) {
+            None => {}
+            Some(watch::Sign::Replaced) => self.lose_mission(),
+            Some(watch::Sign::Suspicious) if self.check.is_some() => {}
+            Some(watch::Sign::Suspicious) => {
+                let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
+                self.say(Level::Warn, "the mission may have been replaced: reading it back");
+                self.check = Some(Download::new(self.talk(vehicle.identity, List::Mission), self.pace()));
+            }
+        }
+    }
+
+    pub(super) fn advance_check(&mut self, vehicle: &Vehicle) {
+        let Some(check) = &mut self.check else { return };
+        let mut out = Vec::<MavMessage>::new();
+        check.poll(self.now, &mut out);
+        let verdict = check.result().map(|kept| {
+            // Silence proves nothing: the next sign asks again.
+            kept.is_ok_and(|kept| first_difference(vehicle.autopilot, true, &self.kept, kept).is_some())
+        });
+        self.send(out);
+        match verdict {
+            None => {}
+            Some(true) => self.lose_mission(),
+            Some(false) => self.check = None,
+        }
+    }
+
+    fn lose_mission(&mut self) {
+        (self.watch, self.check) = (None, None);
+        if matches!(self.phase, Phase::Fly | Phase::Ready) && self.settings.mode == FlyMode::Mission {
+            self.end(End::Released("another station replaced the mission".into()));
+        }
+    }
+}

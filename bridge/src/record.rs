@@ -1,0 +1,249 @@
+//! The record of a flight: every input with its time, every output, and the frames as a `.tlog`.
+//!
+//! A record is a file of JSON lines. The first holds everything that the flight began with; each further line is an
+//! input or what came out of it:
+//!
+//! ```json
+//! {"quietpath_record": 1, "settings": {..}, "scenario_name": "..", "scenario": "..", "plan": {..}}
+//! {"t": 1520034, "in": {"frame": "fd09.."}}
+//! {"t": 1520034, "out": ["send fd1f..", "say info .."]}
+//! ```
+//!
+//! `t` is in microseconds. [`replay`] feeds the inputs to a new flight and compares what comes out, text by text: frames
+//! are written unsigned and with sequence number 0, so that every bit of a message counts and the link does not.
+//!
+//! A `.tlog` holds the frames of both directions, each behind its time in microseconds of Unix time, big-endian; ground
+//! stations read it.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use serde::{Deserialize, Serialize};
+
+use crate::clock::Time;
+use crate::file::{FileError, PlanFile, ScenarioFile};
+use crate::flight::{Flight, Input, Output, Settings};
+use crate::link::codec::{Frame, Identity, plain_bytes};
+use crate::replan::{Answer, Observation};
+
+/// Version of the format.
+const VERSION: u32 = 1;
+/// How often the files are flushed.
+const FLUSH: Duration = Duration::from_secs(1);
+
+/// The first line.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    quietpath_record: u32,
+    settings: Settings,
+    scenario_name: String,
+    scenario: String,
+    plan: PlanFile,
+}
+
+/// An input as it is written.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Written {
+    Tick,
+    Frame(String),
+    LinkUp,
+    LinkDown(String),
+    Observed(Observation),
+    Planned(Answer),
+    Stop(String),
+}
+
+/// Any further line.
+#[derive(Serialize, Deserialize)]
+struct Line {
+    t: Time,
+    #[serde(rename = "in", default, skip_serializing_if = "Option::is_none")]
+    input: Option<Written>,
+    #[serde(rename = "out", default, skip_serializing_if = "Option::is_none")]
+    output: Option<Vec<String>>,
+}
+
+impl Written {
+    fn of(input: &Input) -> Self {
+        match input {
+            Input::Tick => Self::Tick,
+            Input::Frame(frame) => Self::Frame(hexadecimal(&frame.bytes)),
+            Input::LinkUp => Self::LinkUp,
+            Input::LinkDown(why) => Self::LinkDown(why.clone()),
+            Input::Observed(observation) => Self::Observed(observation.clone()),
+            Input::Planned(answer) => Self::Planned(answer.clone()),
+            Input::Stop(why) => Self::Stop(why.clone()),
+        }
+    }
+
+    fn into_input(self) -> Option<Input> {
+        Some(match self {
+            Self::Tick => Input::Tick,
+            Self::Frame(digits) => Input::Frame(Box::new(Frame::parse(&bytes(&digits)?)?)),
+            Self::LinkUp => Input::LinkUp,
+            Self::LinkDown(why) => Input::LinkDown(why),
+            Self::Observed(observation) => Input::Observed(observation),
+            Self::Planned(answer) => Input::Planned(answer),
+            Self::Stop(why) => Input::Stop(why),
+        })
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn bytes(digits: &str) -> Option<Vec<u8>> {
+    let pair = |at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok();
+    (0..digits.len()).step_by(2).map(pair).collect()
+}
+
+/// What a flight wants done, as text that is equal where it is equal bit for bit.
+#[must_use]
+pub fn written(output: &Output) -> String {
+    match output {
+        Output::Send(message) => format!("send {}", hexadecimal(&plain_bytes(Identity::COMPANION, message))),
+        Output::Board(system) => format!("board {system}"),
+        Output::RoundTrip(span) => format!("round trip {} us", span.as_micros()),
+        // Debug prints as many digits as it takes to tell numbers apart.
+        Output::Plan(job) => {
+            format!("plan {} from {:?}: {} {:?}", job.number, job.seam, job.tail.to_json(), job.scenario.sensors)
+        }
+        Output::Say(level, text) => format!("say {level:?} {text}"),
+        Output::End(end) => format!("end {end:?}"),
+    }
+}
+
+/// Writes a record and its `.tlog`.
+pub struct Recorder {
+    lines: BufWriter<File>,
+    tlog: BufWriter<File>,
+    /// Unix time at the clock's zero, microseconds.
+    epoch: u64,
+    flushed: Time,
+    has_failed: bool,
+}
+
+impl Recorder {
+    /// Begins a record at `path`, and `path` with the extension `tlog`. `now` is the clock's time.
+    ///
+    /// # Errors
+    /// The files cannot be written.
+    pub fn create(
+        path: &Path,
+        scenario: &ScenarioFile,
+        plan: &PlanFile,
+        settings: &Settings,
+        now: Time,
+    ) -> io::Result<Self> {
+        let mut lines = BufWriter::new(File::create(path)?);
+        let tlog = BufWriter::new(File::create(path.with_extension("tlog"))?);
+        let header = Header {
+            quietpath_record: VERSION,
+            settings: settings.clone(),
+            scenario_name: scenario.file_name().to_owned(),
+            scenario: scenario.text().to_owned(),
+            plan: plan.clone(),
+        };
+        serde_json::to_writer(&mut lines, &header)?;
+        writeln!(lines)?;
+        let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let epoch = u64::try_from(unix.as_micros()).unwrap_or(u64::MAX).saturating_sub(now.micros());
+        Ok(Self { lines, tlog, epoch, flushed: now, has_failed: false })
+    }
+
+    /// Writes an input and what came out of it.
+    pub fn write(&mut self, now: Time, input: &Input, outputs: &[Output]) {
+        let output = (!outputs.is_empty()).then(|| outputs.iter().map(written).collect());
+        let result = self.try_write(&Line { t: now, input: Some(Written::of(input)), output });
+        if let Input::Frame(frame) = input {
+            self.frame(now, &frame.bytes);
+        }
+        self.note(result);
+        if now.since(self.flushed) >= FLUSH {
+            self.flushed = now;
+            let result = self.lines.flush().and_then(|()| self.tlog.flush());
+            self.note(result);
+        }
+    }
+
+    fn try_write(&mut self, line: &Line) -> io::Result<()> {
+        serde_json::to_writer(&mut self.lines, line)?;
+        writeln!(self.lines)
+    }
+
+    /// Writes a frame, of either direction, to the `.tlog`.
+    pub fn frame(&mut self, now: Time, bytes: &[u8]) {
+        let time = self.epoch.saturating_add(now.micros()).to_be_bytes();
+        let result = self.tlog.write_all(&time).and_then(|()| self.tlog.write_all(bytes));
+        self.note(result);
+    }
+
+    /// A full disk ends the record, and not the flight.
+    fn note(&mut self, result: io::Result<()>) {
+        if let Err(error) = result
+            && !self.has_failed
+        {
+            self.has_failed = true;
+            tracing::error!(%error, "the record is not complete");
+        }
+    }
+}
+
+/// What a replay found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Replayed {
+    /// Inputs fed.
+    pub inputs: usize,
+    /// Outputs that were the same, bit for bit.
+    pub outputs: usize,
+}
+
+/// Feeds a record to a new flight; `each` gets every input's time and outputs.
+///
+/// # Errors
+/// A file that is no record; the first line whose outputs differ, with both.
+pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Replayed, Box<FileError>> {
+    let name = path.display().to_string();
+    let fail = |line: usize, message: String, help: &str| {
+        Box::new(FileError::whole(&format!("{name}:{line}"), message, help))
+    };
+    let record = "give the file that `quietpath-bridge run --record` wrote";
+    let file = File::open(path).map_err(|error| fail(1, format!("cannot be read: {error}"), record))?;
+    let mut lines = BufReader::new(file).lines().enumerate();
+    let first = lines.next().and_then(|(_, line)| line.ok()).unwrap_or_default();
+    let header: Header =
+        serde_json::from_str(&first).map_err(|error| fail(1, format!("is no record: {error}"), record))?;
+    if header.quietpath_record != VERSION {
+        let message = format!("is a record of version {}, and this program reads {VERSION}", header.quietpath_record);
+        return Err(fail(1, message, "replay it with the program that wrote it"));
+    }
+    let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
+    let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
+    let mut replayed = Replayed { inputs: 0, outputs: 0 };
+    for (index, line) in lines {
+        let line = line.map_err(|error| fail(index + 1, format!("cannot be read: {error}"), record))?;
+        let parsed: Result<Line, _> = serde_json::from_str(&line);
+        let Line { t, input, output } = match parsed {
+            Ok(line) => line,
+            // A record that ends in the middle of a line was cut off by a loss of power.
+            Err(error) if error.is_eof() => break,
+            Err(error) => return Err(fail(index + 1, format!("is broken: {error}"), record)),
+        };
+        let input =
+            input.and_then(Written::into_input).ok_or_else(|| fail(index + 1, "holds no input".into(), record))?;
+        let outputs: Vec<String> = flight.step(t, input).iter().map(written).collect();
+        let recorded = output.unwrap_or_default();
+        if outputs != recorded {
+            let message = format!("came out differently\n  then {recorded:?}\n  now  {outputs:?}");
+            return Err(fail(index + 1, message, "the program is another one than the one that flew"));
+        }
+        replayed.inputs += 1;
+        replayed.outputs += outputs.len();
+        each(t, &outputs);
+    }
+    Ok(replayed)
+}

@@ -1,0 +1,575 @@
+//! Flights against a stand-in for a vehicle, under a clock of the test's own.
+
+mod fake;
+
+use fake::{FakeVehicle, VEHICLE};
+use quietpath_bridge::clock::Time;
+use quietpath_bridge::file::plan::AgentPlan;
+use quietpath_bridge::file::{PlanFile, ScenarioFile};
+use quietpath_bridge::flight::settings::{FlyMode, PayloadEntry, PayloadKind, Replanning};
+use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Output, Settings};
+use quietpath_bridge::frame::LocalFrame;
+use quietpath_bridge::link::codec::plain_bytes;
+use quietpath_bridge::link::dialect::*;
+use quietpath_bridge::link::{Frame, Identity};
+use quietpath_bridge::record::{Recorder, replay};
+use quietpath_bridge::replan::{Answer, Job, Observation};
+use quietpath_bridge::telemetry::{Airframe, Autopilot, Mode, mode_command};
+
+const SCENARIO: &str = r#"
+name = "line"
+frame = { unit_m = 10.0, latitude_deg = 47.4, longitude_deg = 8.5, altitude_m = 40.0 }
+grid = { intervals = 20 }
+time = { max = 60.0 }
+domain = { min = [0.0, 0.0], max = [20.0, 20.0] }
+[[agent]]
+start = [1.0, 1.0]
+goal = [19.0, 1.0]
+speed_max = 1.0
+accel_max = 1.0
+jammer = { budget = 20.0, live = true }
+dropout = { budget = 20.0 }
+[[sensor]]
+name = "s1"
+position = [10.0, 5.0]
+detection = { model = "proxy", scale = 1.0, epsilon = 0.5, path_loss = 2.0 }
+[[region]]
+center = [10.0, 8.0]
+radius = 2.0
+[[objective.term]]
+metric = "detection"
+"#;
+const TICK: u64 = 20;
+
+fn scenario() -> ScenarioFile {
+    ScenarioFile::parse("line.toml", SCENARIO).expect("a scenario").scenario
+}
+
+/// 18 length units in 40 s along the south; jamming in the middle, quiet in the last quarter.
+fn plan() -> PlanFile {
+    let path: Vec<Vec<f64>> = (0..=20).map(|node| vec![1.0 + 0.9 * f64::from(node), 1.0]).collect();
+    let control = |from: i32, until: i32, value: f64| -> Option<Vec<f64>> {
+        Some((0..=20).map(|node| if (from..until).contains(&node) { value } else { 0.0 }).collect())
+    };
+    let agent = AgentPlan {
+        name: "uav1".into(),
+        path,
+        jam: control(5, 15, 0.5),
+        azimuth: control(0, 21, std::f64::consts::FRAC_PI_2),
+        dropout: control(15, 21, 1.0),
+    };
+    PlanFile { scenario: "line".into(), duration: 40.0, agents: vec![agent], ..PlanFile::default() }
+}
+
+fn settings(mode: FlyMode) -> Settings {
+    let entry = |kind, component| PayloadEntry { kind, component, instance: 0 };
+    let payload = vec![entry(PayloadKind::Transmitter, 25), entry(PayloadKind::Jammer, 26)];
+    Settings { mode, payload, jammer_armed: true, ..Settings::default() }
+}
+
+/// A vehicle that does what it is told at once.
+struct World {
+    flight: Flight,
+    kind: Autopilot,
+    now: u64,
+    missions: FakeVehicle,
+    armed: bool,
+    landed: MavLandedState,
+    custom_mode: u32,
+    refuses_modes: bool,
+    position: Vec<f64>,
+    current: Option<u16>,
+    silent: bool,
+    level: Option<f32>,
+    power: Option<f32>,
+    setpoints: Vec<(u64, SET_POSITION_TARGET_GLOBAL_INT_DATA)>,
+    jobs: Vec<Job>,
+    said: Vec<String>,
+    end: Option<End>,
+    recorder: Option<Recorder>,
+}
+
+impl World {
+    fn new(kind: Autopilot, settings: Settings) -> Self {
+        let flight = Flight::new(&scenario(), &plan(), settings).expect("a flight");
+        Self {
+            flight,
+            kind,
+            now: 0,
+            missions: FakeVehicle::new(kind),
+            armed: false,
+            landed: MavLandedState::MAV_LANDED_STATE_ON_GROUND,
+            custom_mode: 0,
+            refuses_modes: false,
+            position: vec![0.5, 0.5],
+            current: None,
+            silent: false,
+            level: None,
+            power: None,
+            setpoints: Vec::new(),
+            jobs: Vec::new(),
+            said: Vec::new(),
+            end: None,
+            recorder: None,
+        }
+    }
+
+    fn mode(&mut self, mode: Mode) {
+        let command = mode_command(self.kind, Airframe::Copter, mode).expect("a mode");
+        let [_, main, sub, ..] = command.params.map(|param| param as u32);
+        self.custom_mode = if self.kind == Autopilot::Px4 { main << 16 | sub << 24 } else { main };
+    }
+
+    fn telemetry(&self) -> Vec<MavMessage> {
+        let autopilot = match self.kind {
+            Autopilot::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
+            Autopilot::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        };
+        let armed = MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED;
+        let heartbeat = HEARTBEAT_DATA {
+            custom_mode: self.custom_mode,
+            mavtype: MavType::MAV_TYPE_QUADROTOR,
+            autopilot,
+            base_mode: if self.armed { armed } else { MavModeFlag::empty() },
+            system_status: MavState::MAV_STATE_ACTIVE,
+            mavlink_version: 3,
+        };
+        let place = LocalFrame::of(&scenario()).expect("located").place(&self.position);
+        let position = GLOBAL_POSITION_INT_DATA {
+            lat: (place.latitude_deg * 1e7).round() as i32,
+            lon: (place.longitude_deg * 1e7).round() as i32,
+            alt: 440_000,
+            relative_alt: 40_000,
+            ..Default::default()
+        };
+        let landed = EXTENDED_SYS_STATE_DATA { landed_state: self.landed, ..Default::default() };
+        let current =
+            self.current.map(|seq| MavMessage::MISSION_CURRENT(MISSION_CURRENT_DATA { seq, ..Default::default() }));
+        let rest = [
+            MavMessage::HEARTBEAT(heartbeat),
+            MavMessage::GLOBAL_POSITION_INT(position),
+            MavMessage::EXTENDED_SYS_STATE(landed),
+        ];
+        rest.into_iter().chain(current).collect()
+    }
+
+    fn input(&mut self, input: Input) {
+        let now = Time::from_millis(self.now);
+        let outputs = self.flight.step(now, input.clone());
+        if let Some(recorder) = &mut self.recorder {
+            recorder.write(now, &input, &outputs);
+        }
+        let mut answers = Vec::new();
+        for output in outputs {
+            match output {
+                Output::Send(message) => self.hear(*message, &mut answers),
+                Output::Plan(job) => self.jobs.push(*job),
+                Output::Say(_, text) => self.said.push(text),
+                Output::End(end) => self.end = Some(end),
+                Output::Board(_) | Output::RoundTrip(_) => {}
+            }
+        }
+        if self.silent {
+            return;
+        }
+        for message in answers {
+            self.frame(message);
+        }
+    }
+
+    fn frame(&mut self, message: MavMessage) {
+        let bytes = plain_bytes(VEHICLE, &message);
+        self.input(Input::Frame(Box::new(Frame { from: VEHICLE, sequence: 0, message, bytes })));
+    }
+
+    fn hear(&mut self, message: MavMessage, answers: &mut Vec<MavMessage>) {
+        match &message {
+            MavMessage::COMMAND_LONG(data) => self.command(data, answers),
+            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data) => self.setpoints.push((self.now, data.clone())),
+            _ => {}
+        }
+        let from = Identity::COMPANION;
+        let frame = Frame { from, sequence: 0, message, bytes: Vec::new() };
+        self.missions.handle(Time::from_millis(self.now), &frame, answers);
+    }
+
+    fn command(&mut self, data: &COMMAND_LONG_DATA, answers: &mut Vec<MavMessage>) {
+        match data.command {
+            MavCmd::MAV_CMD_USER_1 => return self.power = Some(data.param2),
+            MavCmd::MAV_CMD_USER_2 => {
+                assert!(data.param2 == 0.0 || data.param3 == 0.0, "to the north");
+                return self.level = Some(data.param2);
+            }
+            MavCmd::MAV_CMD_DO_SET_MODE if !self.refuses_modes => {
+                let (main, sub) = (data.param2 as u32, data.param3 as u32);
+                self.custom_mode = if self.kind == Autopilot::Px4 { main << 16 | sub << 24 } else { main };
+            }
+            MavCmd::MAV_CMD_DO_SET_MISSION_CURRENT => self.current = Some(data.param1 as u16),
+            _ => {}
+        }
+        let result = MavResult::MAV_RESULT_ACCEPTED;
+        answers.push(MavMessage::COMMAND_ACK(COMMAND_ACK_DATA {
+            command: data.command,
+            result,
+            ..Default::default()
+        }));
+    }
+
+    /// Lets time pass, s.
+    fn pass(&mut self, seconds: f64) {
+        let until = self.now + (seconds * 1000.0) as u64;
+        while self.now < until && self.end.is_none() {
+            self.now += TICK;
+            if !self.silent && self.now % 100 == 0 {
+                for message in self.telemetry() {
+                    self.frame(message);
+                }
+            }
+            self.input(Input::Tick);
+            let mut due = Vec::new();
+            self.missions.poll(Time::from_millis(self.now), &mut due);
+            for message in due {
+                self.frame(message);
+            }
+        }
+    }
+
+    /// Up to the moment at which the plan is flown.
+    fn begin(&mut self, mode: FlyMode) {
+        self.pass(5.0);
+        assert!(self.setpoints.is_empty() && self.level.is_none_or(|level| level == 0.0));
+        (self.armed, self.landed) = (true, MavLandedState::MAV_LANDED_STATE_IN_AIR);
+        match mode {
+            FlyMode::Guided => {
+                self.pass(2.0);
+                self.position = vec![1.0, 1.0];
+            }
+            FlyMode::Mission => {
+                self.current = Some(1);
+                self.mode(Mode::Mission);
+            }
+        }
+        for _ in 0..20 {
+            if self.flight.phase() == "fly" {
+                break;
+            }
+            self.pass(0.02);
+        }
+        assert_eq!(self.flight.phase(), "fly", "{:?}", self.said);
+    }
+
+    /// Up to the middle of the plan, where it jams.
+    fn jamming(kind: Autopilot, settings: Settings) -> Self {
+        let mut world = Self::new(kind, settings);
+        world.begin(FlyMode::Guided);
+        world.pass(20.0);
+        assert_eq!((world.level, world.power), (Some(0.5), Some(1.0)), "{:?}", world.said);
+        world
+    }
+}
+
+const KINDS: [Autopilot; 2] = [Autopilot::Px4, Autopilot::ArduPilot];
+
+#[test]
+fn a_guided_flight_streams_before_it_asks_and_follows_the_plan_to_its_end() {
+    for kind in KINDS {
+        let mut world = World::new(kind, settings(FlyMode::Guided));
+        world.begin(FlyMode::Guided);
+        let begin = world.now;
+        assert_eq!(world.missions.lists[1].len(), 1, "the region is a fence");
+        let first = &world.setpoints[0].1;
+        assert_eq!((first.type_mask.bits(), first.alt), (3576, 40.0));
+        world.pass(10.0);
+        let (at, data) = world.setpoints.last().expect("setpoints").clone();
+        let time = (at - begin) as f64 * 1e-3;
+        let expected = LocalFrame::of(&scenario()).expect("located").place(&[1.0 + 0.45 * time, 1.0]);
+        assert!((f64::from(data.lon_int) * 1e-7 - expected.longitude_deg).abs() < 3e-6, "{data:?}");
+        assert_eq!(data.type_mask.bits(), 3072);
+        assert!((data.vy - 4.5).abs() < 1e-4 && data.vx.abs() < 1e-4 && data.vz == 0.0, "{data:?}");
+        let rate = world.setpoints.iter().filter(|(at, _)| *at > world.now - 1000).count();
+        assert!((10..=20).contains(&rate), "{rate} setpoints in a second");
+        world.pass(27.0);
+        assert_eq!((world.level, world.power), (Some(0.0), Some(0.0)), "silent in the last quarter");
+        world.pass(10.0);
+        assert_eq!(world.end, Some(End::Done));
+        assert_eq!((world.level, world.power), (Some(0.0), Some(1.0)));
+    }
+}
+
+#[test]
+fn a_mission_is_delivered_flown_and_scheduled_by_its_items() {
+    for kind in KINDS {
+        let mut world = World::new(kind, settings(FlyMode::Mission));
+        world.begin(FlyMode::Mission);
+        let home = usize::from(kind == Autopilot::ArduPilot);
+        let items = world.missions.lists[0].clone();
+        assert_eq!(items.len(), home + 1 + 1 + 21, "take-off, one speed, nodes");
+        assert!(world.setpoints.is_empty());
+        world.pass(3.0);
+        assert_eq!(world.level, Some(0.0));
+        // The waypoint of node 10: home, take-off, node 0, speed, nodes 1 to 10.
+        world.current = Some((home + 2 + 10) as u16);
+        world.pass(1.0);
+        assert_eq!(world.level, Some(0.5), "{:?}", world.said);
+        world.current = Some((items.len() - 1) as u16);
+        world.pass(1.0);
+        assert_eq!((world.level, world.power), (Some(0.0), Some(0.0)));
+        world.position = vec![19.0, 1.0];
+        world.pass(1.0);
+        assert_eq!(world.end, Some(End::Done));
+    }
+}
+
+/// Every way in which jamming must end, each from the middle of a flight that jams.
+#[test]
+fn level_0_whatever_happens() {
+    let spoils: [(&str, fn(&mut World)); 7] = [
+        ("link loss", |world| world.silent = true),
+        ("disarm", |world| world.armed = false),
+        ("landing", |world| world.landed = MavLandedState::MAV_LANDED_STATE_LANDING),
+        ("on the ground", |world| world.landed = MavLandedState::MAV_LANDED_STATE_ON_GROUND),
+        ("another mode", |world| world.mode(Mode::Hold)),
+        ("return", |world| world.mode(Mode::Return)),
+        ("signal", |world| world.input(Input::Stop("SIGTERM".into()))),
+    ];
+    for kind in KINDS {
+        for (name, spoil) in spoils {
+            let mut world = World::jamming(kind, settings(FlyMode::Guided));
+            spoil(&mut world);
+            world.pass(3.3);
+            assert_eq!((world.level, world.power), (Some(0.0), Some(1.0)), "{kind:?}: {name}");
+            let ended = world.end.is_some();
+            assert_eq!(ended, name != "link loss", "{name}: {:?}", world.end);
+        }
+    }
+}
+
+#[test]
+fn silence_is_at_hand_for_a_panic() {
+    let mut world = World::jamming(Autopilot::Px4, settings(FlyMode::Guided));
+    let silence = world.flight.silence();
+    let levels: Vec<f32> = (silence.iter())
+        .filter_map(|message| match message {
+            MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_USER_2 => Some(data.param2),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(levels, [0.0]);
+}
+
+#[test]
+fn jamming_needs_the_switch_and_the_scenario() {
+    for (armed, live) in [(false, true), (true, false), (false, false)] {
+        let text = SCENARIO.replace("live = true", &format!("live = {live}"));
+        let scenario = ScenarioFile::parse("line.toml", &text).expect("a scenario").scenario;
+        let settings = Settings { jammer_armed: armed, ..settings(FlyMode::Guided) };
+        let mut world = World::new(Autopilot::Px4, settings.clone());
+        world.flight = Flight::new(&scenario, &plan(), settings).expect("a flight");
+        world.begin(FlyMode::Guided);
+        world.pass(45.0);
+        assert_eq!((world.level, world.power), (None, Some(1.0)), "armed {armed}, live {live}");
+        assert_eq!(world.end, Some(End::Done));
+    }
+}
+
+fn replanning(mode: FlyMode) -> Settings {
+    let replan = Replanning { interval_s: 5.0, lead_s: 2.0, deadline_s: 1.0, time_to_live_s: 12.0, sigma_max: 1.0 };
+    Settings { replan: Some(replan), ..settings(mode) }
+}
+
+/// Answers the last job with a plan that bends north by `bend` in the middle.
+fn answer(world: &World, bend: f64) -> Answer {
+    let job = world.jobs.last().expect("a job");
+    let mut plan = job.tail.clone();
+    let last = plan.agents[0].path.len() - 1;
+    for (node, position) in plan.agents[0].path.iter_mut().enumerate() {
+        let share = node as f64 / last as f64;
+        position[1] += bend * (share * (1.0 - share)).powi(2);
+    }
+    Answer { number: job.number, result: Ok((plan, true)) }
+}
+
+#[test]
+fn a_new_plan_takes_over_at_its_seam_without_a_jump() {
+    let mut world = World::new(Autopilot::Px4, replanning(FlyMode::Guided));
+    world.begin(FlyMode::Guided);
+    world.pass(5.0);
+    assert_eq!(world.jobs.len(), 1, "{:?}", world.said);
+    let reply = answer(&world, 8.0);
+    world.input(Input::Planned(reply));
+    let from = world.setpoints.len();
+    world.pass(9.0);
+    let flown: Vec<_> = world.setpoints[from..].iter().map(|(_, data)| (data.lat_int, data.lon_int)).collect();
+    let jumps = flown.windows(2).map(|pair| (pair[1].0 - pair[0].0).abs().max((pair[1].1 - pair[0].1).abs()));
+    // 4.5 m/s at 16 setpoints a second: 0.3 m, 40 units of 1e-7 degrees of longitude.
+    assert!(jumps.max().expect("setpoints") < 60, "{:?}", world.said);
+    let north = flown.iter().map(|(lat, _)| lat).max().expect("setpoints") - flown[0].0;
+    assert!(north > 100, "the new plan is flown: {north}");
+}
+
+#[test]
+fn a_plan_that_is_late_infeasible_not_finite_stale_or_elsewhere_never_flies() {
+    let spoils: [(&str, fn(&mut Answer, &mut World)); 6] = [
+        ("after the time at which", |_, world| world.pass(2.5)),
+        ("breaks a constraint", |answer, _| answer.result.as_mut().expect("a plan").1 = false),
+        ("not finite", |answer, _| answer.result.as_mut().expect("a plan").0.agents[0].path[3][1] = f64::NAN),
+        ("not finite", |answer, _| answer.result.as_mut().expect("a plan").0.duration = f64::INFINITY),
+        ("does not begin where", |answer, _| {
+            answer.result.as_mut().expect("a plan").0.agents[0].path[0][1] += 1.0;
+        }),
+        ("failed: why", |answer, _| answer.result = Err("why".into())),
+    ];
+    for (says, spoil) in spoils {
+        let mut world = World::new(Autopilot::Px4, replanning(FlyMode::Guided));
+        world.begin(FlyMode::Guided);
+        world.pass(5.0);
+        let mut reply = answer(&world, 8.0);
+        spoil(&mut reply, &mut world);
+        world.input(Input::Planned(reply));
+        assert!(world.said.iter().any(|text| text.contains(says)), "{says}: {:?}", world.said);
+        world.pass(4.0);
+        let (_, data) = world.setpoints.last().expect("setpoints");
+        assert!(data.vx.abs() < 1e-3 && data.vy > 4.0, "the plan before flies on: {data:?}");
+    }
+    let mut world = World::new(Autopilot::Px4, replanning(FlyMode::Guided));
+    world.begin(FlyMode::Guided);
+    world.pass(5.0);
+    let stale = Answer { number: 99, ..answer(&world, 8.0) };
+    world.input(Input::Planned(stale));
+    let good = answer(&world, 8.0);
+    world.input(Input::Planned(good));
+    world.pass(8.0);
+    assert!(world.said.iter().any(|text| text.contains("flies")), "{:?}", world.said);
+}
+
+#[test]
+fn a_stalled_planner_means_level_0_then_no_setpoint_beyond_the_time_to_live() {
+    for (policy, mode) in
+        [(OnFailure::Hold, Mode::Hold), (OnFailure::Return, Mode::Return), (OnFailure::Continue, Mode::Hold)]
+    {
+        let settings = Settings { on_failure: policy, ..replanning(FlyMode::Guided) };
+        let mut world = World::new(Autopilot::ArduPilot, settings);
+        world.begin(FlyMode::Guided);
+        let begin = world.now;
+        // It jams from 8 s on; asked at 5 s, the planner is stalled from 7 s on.
+        world.pass(9.5);
+        assert_eq!(world.level, Some(0.0), "stalled");
+        world.pass(5.0);
+        let mut wanted = World::new(Autopilot::ArduPilot, Settings::default());
+        wanted.mode(mode);
+        assert_eq!(world.custom_mode, wanted.custom_mode, "{policy:?}");
+        assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("time to live")), "{:?}", world.end);
+        let along = world.setpoints.iter().filter(|(_, data)| data.type_mask.bits() == 3072);
+        let last = along.map(|(at, _)| *at).max().expect("setpoints");
+        assert!(last <= begin + 12_100, "{last} {begin}");
+    }
+}
+
+#[test]
+fn the_rest_of_a_mission_is_replaced_and_its_first_item_said() {
+    for kind in KINDS {
+        let mut world = World::new(kind, replanning(FlyMode::Mission));
+        world.begin(FlyMode::Mission);
+        let home = u16::from(kind == Autopilot::ArduPilot);
+        world.current = Some(home + 2 + 3);
+        world.pass(1.0);
+        let before = world.missions.lists[0].len();
+        for _ in 0..40 {
+            world.pass(0.1);
+            if !world.jobs.is_empty() {
+                break;
+            }
+        }
+        // The clock waits at node 3, 6 s into the plan: past the interval.
+        assert_eq!(world.jobs.len(), 1, "{:?}", world.said);
+        let reply = answer(&world, 8.0);
+        world.input(Input::Planned(reply));
+        world.pass(2.0);
+        let after = world.missions.lists[0].clone();
+        assert!(after.len() < before, "{:?}", world.said);
+        assert!(after.iter().all(|item| item.command != MavCmd::MAV_CMD_NAV_TAKEOFF));
+        assert_eq!(world.current, Some(home), "{:?}", world.said);
+        assert_eq!(world.flight.phase(), "fly");
+    }
+}
+
+#[test]
+fn another_stations_mission_ends_ours() {
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Mission));
+    world.begin(FlyMode::Mission);
+    let current = MISSION_CURRENT_DATA { seq: 1, mission_id: 4711, ..Default::default() };
+    world.frame(MavMessage::MISSION_CURRENT(current));
+    assert!(matches!(&world.end, Some(End::Released(why)) if why.contains("another station")), "{:?}", world.end);
+}
+
+#[test]
+fn an_overheard_acceptance_is_looked_into() {
+    for replaced in [false, true] {
+        let mut world = World::new(Autopilot::ArduPilot, settings(FlyMode::Mission));
+        world.begin(FlyMode::Mission);
+        if replaced {
+            world.missions.lists[0][5].x += 5000;
+        }
+        let station = Identity { system: 255, component: 190 };
+        world.frame(fake::ack(station, 0, MavMissionResult::MAV_MISSION_ACCEPTED, 0));
+        world.pass(3.0);
+        let released = matches!(&world.end, Some(End::Released(why)) if why.contains("another station"));
+        assert_eq!(released, replaced, "{:?} {:?}", world.end, world.said);
+    }
+}
+
+#[test]
+fn guided_needs_a_mode_that_the_autopilot_grants() {
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.refuses_modes = true;
+    world.pass(5.0);
+    (world.armed, world.landed) = (true, MavLandedState::MAV_LANDED_STATE_IN_AIR);
+    world.position = vec![1.0, 1.0];
+    world.pass(20.0);
+    assert_eq!(world.flight.phase(), "approach");
+    assert_eq!(world.level, Some(0.0));
+}
+
+#[test]
+fn a_recorded_flight_replays_bit_for_bit_and_a_changed_one_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("flight.jsonl");
+    let settings = replanning(FlyMode::Guided);
+    let mut world = World::new(Autopilot::Px4, settings.clone());
+    let recorder = Recorder::create(&path, &scenario(), &plan(), &settings, Time::ZERO);
+    world.recorder = Some(recorder.expect("a record"));
+    world.begin(FlyMode::Guided);
+    let seen = Observation::parse("{\"id\": \"s1\", \"position\": [9.5, 5.5]}").expect("an observation");
+    world.input(Input::Observed(seen));
+    world.pass(5.0);
+    let reply = answer(&world, 8.0);
+    world.input(Input::Planned(reply));
+    world.pass(5.0);
+    world.input(Input::LinkDown("pulled".into()));
+    world.pass(3.0);
+    world.input(Input::Stop("enough".into()));
+    world.pass(5.0);
+    assert_eq!(world.end, Some(End::Stopped("enough".into())));
+    drop(world.recorder.take());
+    let mut sent = 0;
+    let replayed = replay(&path, |_, outputs| {
+        sent += outputs.iter().filter(|output| output.starts_with("send ")).count();
+    });
+    let replayed = replayed.expect("the same again");
+    assert!(replayed.inputs > 500 && replayed.outputs > sent && sent > 200, "{replayed:?} {sent}");
+    // The tlog: a time of this century before every frame.
+    let tlog = std::fs::read(path.with_extension("tlog")).expect("a tlog");
+    let time = u64::from_be_bytes(tlog[..8].try_into().expect("8 bytes"));
+    assert!((1.7e15..4e15).contains(&(time as f64)) && tlog[8] == 0xFD, "{time}");
+    let text = std::fs::read_to_string(&path).expect("a record");
+    let changed = text.replacen("9.5,5.5", "9.5,5.6", 1);
+    assert_ne!(changed, text);
+    std::fs::write(&path, changed).expect("written");
+    let error = replay(&path, |_, _| {}).expect_err("another world, another plan");
+    assert!(error.to_string().contains("came out differently"), "{error}");
+    std::fs::write(&path, text.get(..text.len() - 30).expect("long")).expect("written");
+    replay(&path, |_, _| {}).expect("cut off in the middle of a line");
+    std::fs::write(&path, "{}").expect("written");
+    let error = replay(&path, |_, _| {}).expect_err("no record").to_string();
+    assert!(error.contains("is no record: missing field `quietpath_record`"), "{error}");
+}
