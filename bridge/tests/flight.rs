@@ -220,7 +220,7 @@ impl World {
         let until = self.now + (seconds * 1000.0) as u64;
         while self.now < until && self.end.is_none() {
             self.now += TICK;
-            if !self.silent && self.now % 100 == 0 {
+            if !self.silent && self.now.is_multiple_of(100) {
                 for message in self.telemetry() {
                     self.frame(message);
                 }
@@ -323,7 +323,8 @@ fn a_mission_is_delivered_flown_and_scheduled_by_its_items() {
 /// Every way in which jamming must end, each from the middle of a flight that jams.
 #[test]
 fn level_0_whatever_happens() {
-    let spoils: [(&str, fn(&mut World)); 7] = [
+    type Spoil = fn(&mut World);
+    let spoils: [(&str, Spoil); 7] = [
         ("link loss", |world| world.silent = true),
         ("disarm", |world| world.armed = false),
         ("landing", |world| world.landed = MavLandedState::MAV_LANDED_STATE_LANDING),
@@ -409,7 +410,8 @@ fn a_new_plan_takes_over_at_its_seam_without_a_jump() {
 
 #[test]
 fn a_plan_that_is_late_infeasible_not_finite_stale_or_elsewhere_never_flies() {
-    let spoils: [(&str, fn(&mut Answer, &mut World)); 6] = [
+    type Spoil = fn(&mut Answer, &mut World);
+    let spoils: [(&str, Spoil); 6] = [
         ("after the time at which", |_, world| world.pass(2.5)),
         ("breaks a constraint", |answer, _| answer.result.as_mut().expect("a plan").1 = false),
         ("not finite", |answer, _| answer.result.as_mut().expect("a plan").0.agents[0].path[3][1] = f64::NAN),

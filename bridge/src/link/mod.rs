@@ -54,7 +54,7 @@ pub use address::Address;
 pub use codec::{Frame, Identity};
 pub use endpoint::{Accept, Endpoint};
 pub use signing::Signing;
-pub use socket::Source;
+pub use socket::{Source, listen};
 pub use statistics::Statistics;
 pub use thread::{Event, Link};
 

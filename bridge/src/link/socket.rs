@@ -59,6 +59,16 @@ pub(super) fn open(address: &Address) -> io::Result<Halves> {
     }
 }
 
+/// A socket that listens for datagrams and never waits: for those who observe.
+///
+/// # Errors
+/// The address is taken, or is none of this machine.
+pub fn listen(at: &str) -> io::Result<UdpSocket> {
+    let socket = UdpSocket::bind(resolve(at)?)?;
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
+
 fn resolve(address: &str) -> io::Result<SocketAddr> {
     let missing = || io::Error::new(ErrorKind::NotFound, format!("{address} has no address"));
     address.to_socket_addrs()?.next().ok_or_else(missing)
