@@ -35,7 +35,7 @@ impl Sample {
     }
 }
 
-/// One agent's plan as a curve. See the [module](self).
+/// One agent's plan as a curve: the cubic described at the top of its file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     times: Vec<f64>,

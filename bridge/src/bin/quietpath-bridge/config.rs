@@ -137,3 +137,19 @@ impl Config {
             .map_err(|error| Outcome::Fault(format!("no thread for the link: {error}")))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_example_is_what_happens_without_it_but_for_what_it_turns_on() {
+        let example: Config =
+            toml::from_str(include_str!("../../../install/bridge.toml")).expect("the example reads");
+        let replan = example.flight.replan;
+        assert_eq!(replan, Some(quietpath_bridge::flight::settings::Replanning::default()));
+        let plain = Settings { replan, payload: example.flight.payload.clone(), ..Settings::default() };
+        assert_eq!(example.flight, plain);
+        assert_eq!(example.flight.payload.len(), 1);
+    }
+}
