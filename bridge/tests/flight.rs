@@ -412,7 +412,7 @@ fn a_new_plan_takes_over_at_its_seam_without_a_jump() {
 fn a_plan_that_is_late_infeasible_not_finite_stale_or_elsewhere_never_flies() {
     type Spoil = fn(&mut Answer, &mut World);
     let spoils: [(&str, Spoil); 6] = [
-        ("after the time at which", |_, world| world.pass(2.5)),
+        ("after the time at which", |_, world| world.pass(4.5)),
         ("breaks a constraint", |answer, _| answer.result.as_mut().expect("a plan").1 = false),
         ("not finite", |answer, _| answer.result.as_mut().expect("a plan").0.agents[0].path[3][1] = f64::NAN),
         ("not finite", |answer, _| answer.result.as_mut().expect("a plan").0.duration = f64::INFINITY),
@@ -429,7 +429,7 @@ fn a_plan_that_is_late_infeasible_not_finite_stale_or_elsewhere_never_flies() {
         spoil(&mut reply, &mut world);
         world.input(Input::Planned(reply));
         assert!(world.said.iter().any(|text| text.contains(says)), "{says}: {:?}", world.said);
-        world.pass(4.0);
+        world.pass(2.2);
         let (_, data) = world.setpoints.last().expect("setpoints");
         assert!(data.vx.abs() < 1e-3 && data.vy > 4.0, "the plan before flies on: {data:?}");
     }

@@ -78,9 +78,7 @@ impl Flight {
         if is_busy || time - self.flying.made < replan.interval_s {
             return;
         }
-        let seam = time + replan.lead_s;
-        let at = self.flying.curve.sample(seam);
-        let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, seam, &at) else {
+        let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, time + replan.lead_s) else {
             // Too little is left: the plan is good to its end.
             self.flying.made = time;
             return;

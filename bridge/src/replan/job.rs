@@ -1,8 +1,9 @@
 //! The problem of the rest of the flight, and when its answer may fly.
 //!
-//! A plan takes time to make, so it is made for a time ahead: the *seam*, `lead` from now. The rest of the flight begins
-//! there with the position and velocity that the flying plan has then, keeps the length of the intervals, and drops the
-//! nodes that are flown. The tail of the flying plan is where the planner starts from, so its answer is no worse.
+//! A plan takes time to make, so it is made for a time ahead: the *seam*, the flying plan's first node after `lead` from
+//! now. Nodes keep every constraint, which the curve between them need not. The rest of the flight begins there with the
+//! position and velocity that the flying plan has then, and drops the nodes that are flown: the tail of the flying plan
+//! is a plan of the rest, and where the planner starts from, so its answer is no worse.
 //!
 //! Limits: one agent.
 
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::file::scenario::ScenarioFile;
 use crate::file::{PlanFile, plan::AgentPlan};
-use crate::setpoint::{Curve, Sample};
+use crate::setpoint::Curve;
 
 /// Intervals below which the rest is not worth planning anew.
 const INTERVALS_MIN: usize = 4;
@@ -72,36 +73,39 @@ impl std::fmt::Display for Rejected {
     }
 }
 
-/// The rest of a flight from the seam on; `None` where too little is left to plan.
-///
-/// `world` is the scenario as it is known now; `at` is where the vehicle is going to be at the seam.
+/// The rest of a flight, from the first node that is not before `earliest`, s of the scenario; `None` where too little is
+/// left to plan. `world` is the scenario as it is known now.
 #[must_use]
-pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64, at: &Sample) -> Option<Job> {
+pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, earliest: f64) -> Option<Job> {
     let times = flying.node_times();
-    let last = times.last().copied()?;
-    let first_left = times.iter().position(|time| *time > seam)?;
-    let intervals = times.len().checked_sub(first_left)?;
+    let first = times.iter().position(|time| *time >= earliest)?;
+    let (seam, last) = (times.get(first).copied()?, times.last().copied()?);
+    let intervals = times.len().checked_sub(first + 1)?;
     if intervals < INTERVALS_MIN {
         return None;
     }
     let agent_plan = flying.agents.first()?;
     let curve = Curve::of(flying, &agent_plan.name)?;
+    let at = curve.sample(seam);
     let mut scenario = world.clone();
     scenario.start_time = seam;
     scenario.intervals = intervals;
     let interval = (last - seam) / intervals as f64;
     let node_time = |node: usize| seam + interval * node as f64;
     let agent = scenario.agents.first_mut()?;
-    agent.start.clone_from(&at.position);
-    agent.start_velocity = Some(at.velocity.clone());
+    agent.start.clone_from(agent_plan.path.get(first)?);
+    agent.start_velocity = Some(at.velocity);
     if let Some(jammer) = &mut agent.jammer {
         jammer.budget = left(jammer.budget, &times, agent_plan.jam.as_deref(), seam);
     }
     if let Some(dropout) = &mut agent.dropout {
         dropout.budget = left(dropout.budget, &times, agent_plan.dropout.as_deref(), seam);
     }
-    let mut path: Vec<Vec<f64>> = (0..=intervals).map(|node| curve.sample(node_time(node)).position).collect();
-    path.first_mut()?.clone_from(&at.position);
+    // Nodes of unequal times are not those of a new plan: the curve between them is.
+    let sampled = || (0..=intervals).map(|node| curve.sample(node_time(node)).position).collect();
+    let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
+    let mut path: Vec<Vec<f64>> = if flying.times.is_some() { sampled() } else { nodes() };
+    path.first_mut()?.clone_from(&agent.start);
     path.last_mut()?.clone_from(&agent.goal);
     let control = |values: &Option<Vec<f64>>| {
         values.as_ref().map(|values| {
@@ -153,14 +157,16 @@ pub fn judge(asked: &Job, answer: &Answer, now: f64, flying: &Curve) -> Result<(
     if !controls.into_iter().flatten().flatten().all(|number| number.is_finite()) {
         return Err(Rejected::Malformed);
     }
-    let curve = Curve::of(plan, &agent.name).ok_or(Rejected::Malformed)?;
+    let here = flying.sample(asked.seam);
+    // It takes over with the velocity that the flying plan has: the setpoints do not jump.
+    let curve = Curve::of(plan, &agent.name).ok_or(Rejected::Malformed)?.from_velocity(&here.velocity);
     if !feasible {
         return Err(Rejected::Infeasible);
     }
     if now > asked.seam {
         return Err(Rejected::Late);
     }
-    let (there, here) = (curve.sample(asked.seam), flying.sample(asked.seam));
+    let there = curve.sample(asked.seam);
     let start = asked.scenario.agents.first().map(|agent| agent.start.as_slice()).unwrap_or_default();
     let far = |from: &[f64]| from.iter().zip(&there.position).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     let interval = (curve.end() - curve.begin()) / plan.nodes().max(2) as f64;

@@ -70,6 +70,15 @@ impl Curve {
         Some(Self { times, nodes, velocities })
     }
 
+    /// The same curve, beginning with a velocity, length units / s, where it has as many components.
+    #[must_use]
+    pub fn from_velocity(mut self, velocity: &[f64]) -> Self {
+        if let Some(first) = self.velocities.first_mut().filter(|first| first.len() == velocity.len()) {
+            first.copy_from_slice(velocity);
+        }
+        self
+    }
+
     /// Time of the first node, s.
     #[must_use]
     pub fn begin(&self) -> f64 {
