@@ -346,6 +346,26 @@ fn level_0_whatever_happens() {
 }
 
 #[test]
+fn nothing_is_emitted_on_the_way_to_the_plan_nor_on_the_way_out() {
+    let mut loud = plan();
+    loud.agents[0].jam = Some(vec![1.0; 21]);
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.flight = Flight::new(&scenario(), &loud, settings(FlyMode::Guided)).expect("a flight");
+    world.pass(5.0);
+    (world.armed, world.landed) = (true, MavLandedState::MAV_LANDED_STATE_IN_AIR);
+    world.pass(5.0);
+    assert_eq!((world.flight.phase(), world.flight.vehicle().expect("heard").mode), ("approach", Mode::Guided));
+    assert_eq!(world.level, Some(0.0), "not at the start yet");
+    world.position = vec![1.0, 1.0];
+    world.pass(1.0);
+    assert_eq!((world.flight.phase(), world.level), ("fly", Some(1.0)));
+    world.refuses_modes = true;
+    world.input(Input::Stop("enough".into()));
+    world.pass(0.1);
+    assert_eq!((world.flight.phase(), world.level), ("leave", Some(0.0)));
+}
+
+#[test]
 fn silence_is_at_hand_for_a_panic() {
     let mut world = World::jamming(Autopilot::Px4, settings(FlyMode::Guided));
     let silence = world.flight.silence();
