@@ -31,7 +31,7 @@ struct Arguments {
 enum Command {
     /// Formatting, lints and documentation, with warnings as errors
     Check,
-    /// All tests, and the core for the microcontroller; installs the target if it is missing
+    /// All tests, those with programs from PyPI too, and the core for the microcontroller; installs the target if it is missing
     Test,
     /// The core alone for the microcontroller, in f32 and f64
     Target,
@@ -103,7 +103,9 @@ fn check() -> Vec<Step> {
 }
 
 fn test() -> Vec<Step> {
-    let mut steps = vec![Step::cargo("tests", "test --workspace")];
+    let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
+    let mut steps =
+        vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
     steps.extend(target());
     steps
 }

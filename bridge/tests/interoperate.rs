@@ -1,0 +1,144 @@
+//! The program with other people's MAVLink: pymavlink plays the vehicle, and reads our files.
+//!
+//! These tests make a Python environment under `target/` and fill it from PyPI, so they run where they are asked for:
+//! `cargo xtask test`, or `cargo test -p quietpath-bridge --test interoperate -- --ignored`.
+
+#![cfg(unix)]
+
+mod shared;
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use serde_json::Value;
+use shared::{Folder, free_port, program, run, terminate};
+
+const PYMAVLINK: &str = "pymavlink==2.4.50";
+const KEY: &str = "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff";
+
+/// The Python of an environment that has pymavlink.
+fn python() -> &'static Path {
+    static PYTHON: OnceLock<PathBuf> = OnceLock::new();
+    PYTHON.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pymavlink");
+        let python = folder.join("bin/python");
+        let has = |python: &Path| {
+            let probe = Command::new(python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();
+            probe.is_ok_and(|status| status.success())
+        };
+        if !has(&python) {
+            succeed(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder));
+            succeed(Command::new(folder.join("bin/pip")).args(["install", "--quiet", PYMAVLINK]));
+        }
+        assert!(has(&python), "{} has no pymavlink", python.display());
+        python
+    })
+}
+
+fn succeed(command: &mut Command) {
+    let status = command.status();
+    assert!(status.as_ref().is_ok_and(|status| status.success()), "{command:?}: {status:?}");
+}
+
+fn script(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interoperate").join(name)
+}
+
+/// A vehicle by pymavlink; ended where it is dropped.
+struct Vehicle(Option<Child>);
+
+impl Vehicle {
+    fn start(port: u16, key: Option<&str>) -> Self {
+        let mut command = Command::new(python());
+        command.arg(script("vehicle.py")).arg(port.to_string()).args(key);
+        Self(Some(command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("Python runs")))
+    }
+
+    /// What it got.
+    fn end(mut self) -> Value {
+        let mut child = self.0.take().expect("it runs");
+        let mut input = child.stdin.take().expect("a pipe");
+        input.write_all(b"\n").expect("it reads");
+        drop(input);
+        let output = child.wait_with_output().expect("it ends");
+        serde_json::from_slice(&output.stdout).expect("a line of JSON")
+    }
+}
+
+impl Drop for Vehicle {
+    fn drop(&mut self) {
+        if let Some(mut child) = self.0.take() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+#[test]
+#[ignore = "makes a Python environment"]
+fn pymavlink_receives_missions_and_fences_and_gives_them_back() {
+    for key in [None, Some(KEY)] {
+        let folder = Folder::new();
+        folder.write("key", KEY);
+        let key_file = folder.path("key");
+        std::fs::set_permissions(&key_file, std::os::unix::fs::PermissionsExt::from_mode(0o600))
+            .expect("permissions");
+        let port = free_port();
+        let vehicle = Vehicle::start(port, key);
+        let link = format!("udpin:127.0.0.1:{port}");
+        let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
+        let signing = ["--signing-key", key_file.as_str()];
+        let signing: &[&str] = if key.is_some() { &signing } else { &[] };
+        let upload = ["upload", "--link", &link, "--scenario", &scenario, "--plan", &plan];
+        let (status, out, err) = run(&[&upload, signing].concat());
+        assert_eq!(status, 0, "{out}{err}");
+        let (status, out, err) = run(&[&["download", "--link", &link][..], signing].concat());
+        assert_eq!((status, out.lines().count()), (0, 8), "{out}{err}");
+        let got = vehicle.end();
+        let lists = &got["lists"];
+        let commands: Vec<u64> =
+            lists["0"].as_array().expect("a list").iter().filter_map(|item| item[0].as_u64()).collect();
+        assert_eq!(commands, [22, 16, 178, 16, 16, 16, 16], "take-off, start, speed, nodes");
+        assert_eq!(lists["0"][2][6], 4.0, "10 m a length unit, 2 of them in 5 s");
+        assert_eq!(lists["1"].as_array().map(Vec::len), Some(1));
+        assert_eq!(
+            (lists["1"][0][0].as_u64(), lists["1"][0][5].as_f64()),
+            (Some(5004), Some(20.0)),
+            "an exclusion circle"
+        );
+        let (signed, unsigned) =
+            (got["signed"].as_u64().expect("a count"), got["unsigned"].as_u64().expect("a count"));
+        assert!(if key.is_some() { signed > 10 && unsigned == 0 } else { unsigned > 10 && signed == 0 }, "{got}");
+    }
+}
+
+#[test]
+#[ignore = "makes a Python environment"]
+fn pymavlink_reads_our_waypoints_and_logs() {
+    let folder = Folder::new();
+    let port = free_port();
+    let _vehicle = Vehicle::start(port, None);
+    let link = format!("udpin:127.0.0.1:{port}");
+    let (scenario, plan, record) =
+        (folder.path("scenario.toml"), folder.path("plan.json"), folder.path("flight.jsonl"));
+    let arguments = ["run", "--link", &link, "--scenario", &scenario, "--plan", &plan, "--record", &record];
+    let child = program(&arguments).spawn().expect("the program runs");
+    std::thread::sleep(Duration::from_secs(3));
+    let (status, _, err) = terminate(child);
+    assert_eq!(status, 4, "{err}");
+    let waypoints = folder.path("kept.waypoints");
+    let (status, _, err) = run(&["download", "--link", &link, "--out", &waypoints]);
+    assert_eq!(status, 0, "{err}");
+    let read = Command::new(python()).arg(script("read.py")).args([waypoints, folder.path("flight.tlog")]).output();
+    let read: Value = serde_json::from_slice(&read.expect("Python runs").stdout).expect("a line of JSON");
+    assert_eq!(
+        (read["count"].as_u64(), read["command"].as_u64(), read["bad"].as_u64()),
+        (Some(7), Some(16), Some(0))
+    );
+    assert!((read["x"].as_f64().expect("a latitude") - 47.4).abs() < 0.01, "{read}");
+    let heartbeats = read["kinds"]["HEARTBEAT"].as_u64().expect("heartbeats");
+    assert!(heartbeats > 10 && read["kinds"]["MISSION_ITEM_INT"].as_u64() > Some(10), "{read}");
+}
