@@ -519,8 +519,13 @@ fn the_rest_of_a_mission_is_replaced_and_its_first_item_said() {
 fn another_stations_mission_ends_ours() {
     let mut world = World::new(Autopilot::Px4, settings(FlyMode::Mission));
     world.begin(FlyMode::Mission);
-    let current = MISSION_CURRENT_DATA { seq: 1, mission_id: 4711, ..Default::default() };
-    world.frame(MavMessage::MISSION_CURRENT(current));
+    let current = |mission_id| MISSION_CURRENT_DATA { seq: 1, mission_id, ..Default::default() };
+    world.frame(MavMessage::MISSION_CURRENT(current(4711)));
+    world.pass(2.0);
+    assert_eq!(world.end, None, "another id, and the mission is ours all the same");
+    world.missions.lists[0].pop();
+    world.frame(MavMessage::MISSION_CURRENT(current(4712)));
+    world.pass(2.0);
     assert!(matches!(&world.end, Some(End::Released(why)) if why.contains("another station")), "{:?}", world.end);
 }
 

@@ -11,7 +11,6 @@ use quietpath_bridge::link::dialect::{MavCmd, MavFrame, MavMessage, MavMissionRe
 use quietpath_bridge::link::memory::{Faults, Wire};
 use quietpath_bridge::link::{Accept, Endpoint, Frame, Identity, Source};
 use quietpath_bridge::mission::item::first_difference;
-use quietpath_bridge::mission::watch::Sign;
 use quietpath_bridge::mission::{Delivered, Delivery, Download, Failure, Item, List, Pace, Talk, Upload, Watch};
 use quietpath_bridge::telemetry::Autopilot;
 
@@ -231,17 +230,23 @@ fn a_replaced_mission_is_noticed() {
         frame(VEHICLE, MavMessage::MISSION_CURRENT(data))
     };
     let mut watch = Watch::new(talk(List::Mission), Delivered { count: 10, opaque_id: 77 });
-    assert_eq!(watch.handle(&current(77, 10)), None);
-    assert_eq!(watch.handle(&current(78, 10)), Some(Sign::Replaced));
+    assert!(!watch.handle(&current(77, 10)));
+    assert!(watch.handle(&current(78, 10)));
+    watch.confirm();
+    assert!(
+        !watch.handle(&current(78, 10)) && watch.handle(&current(77, 10)),
+        "read back, it was ours by another id"
+    );
     let mut without_id = Watch::new(talk(List::Mission), Delivered { count: 10, opaque_id: 0 });
-    for (total, sign) in [(10, None), (9, None), (0, None), (u16::MAX, None), (7, Some(Sign::Suspicious))] {
+    for (total, sign) in [(10, false), (9, false), (0, false), (u16::MAX, false), (7, true)] {
         assert_eq!(without_id.handle(&current(0, total)), sign, "{total}");
     }
+    assert!(!without_id.handle(&current(5, 10)) && without_id.handle(&current(6, 10)), "the first id is ours");
     let accepted = MavMissionResult::MAV_MISSION_ACCEPTED;
     let station = Identity { system: 255, component: 190 };
     let overheard = frame(VEHICLE, fake::ack(station, 0, accepted, 0));
-    assert_eq!(without_id.handle(&overheard), Some(Sign::Suspicious));
-    assert_eq!(without_id.handle(&frame(VEHICLE, fake::ack(station, 1, accepted, 0))), None, "a fence");
-    assert_eq!(without_id.handle(&frame(VEHICLE, fake::ack(US, 0, accepted, 0))), None, "ours");
-    assert_eq!(without_id.handle(&frame(station, fake::ack(station, 0, accepted, 0))), None, "not the vehicle");
+    assert!(without_id.handle(&overheard));
+    assert!(!without_id.handle(&frame(VEHICLE, fake::ack(station, 1, accepted, 0))), "a fence");
+    assert!(!without_id.handle(&frame(VEHICLE, fake::ack(US, 0, accepted, 0))), "ours");
+    assert!(!without_id.handle(&frame(station, fake::ack(station, 0, accepted, 0))), "not the vehicle");
 }

@@ -6,7 +6,7 @@
 use crate::link::Frame;
 use crate::link::dialect::MavMessage;
 use crate::mission::item::first_difference;
-use crate::mission::{Download, Item, List, Watch, watch};
+use crate::mission::{Download, Item, List, Watch};
 use crate::telemetry::Vehicle;
 
 use super::settings::FlyMode;
@@ -28,31 +28,33 @@ impl Flight {
             check.handle(self.now, frame, &mut out);
         }
         self.send(out);
-        match self.watch.as_mut().and_then(|watch| watch.handle(frame)) {
-            None => {}
-            Some(watch::Sign::Replaced) => self.lose_mission(),
-            Some(watch::Sign::Suspicious) if self.check.is_some() => {}
-            Some(watch::Sign::Suspicious) => {
-                let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
-                self.say(Level::Warn, "the mission may have been replaced: reading it back");
-                self.check = Some(Download::new(self.talk(vehicle.identity, List::Mission), self.pace()));
-            }
+        if !self.watch.as_mut().is_some_and(|watch| watch.handle(frame)) || self.check.is_some() {
+            return;
         }
+        let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
+        self.say(Level::Warn, "the mission may have been replaced: reading it back");
+        self.check = Some(Download::new(self.talk(vehicle.identity, List::Mission), self.pace()));
     }
 
     pub(super) fn advance_check(&mut self, vehicle: &Vehicle) {
         let Some(check) = &mut self.check else { return };
         let mut out = Vec::<MavMessage>::new();
         check.poll(self.now, &mut out);
-        let verdict = check.result().map(|kept| {
-            // Silence proves nothing: the next sign asks again.
-            kept.is_ok_and(|kept| first_difference(vehicle.autopilot, true, &self.kept, kept).is_some())
-        });
+        let verdict = check
+            .result()
+            .map(|kept| kept.map(|kept| first_difference(vehicle.autopilot, true, &self.kept, kept).is_none()));
         self.send(out);
         match verdict {
             None => {}
-            Some(true) => self.lose_mission(),
-            Some(false) => self.check = None,
+            Some(Ok(false)) => self.lose_mission(),
+            Some(Ok(true)) => {
+                self.check = None;
+                if let Some(watch) = &mut self.watch {
+                    watch.confirm();
+                }
+            }
+            // Silence proves nothing: the next sign asks again.
+            Some(Err(_)) => self.check = None,
         }
     }
 
