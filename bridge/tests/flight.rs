@@ -6,12 +6,13 @@ use fake::{FakeVehicle, VEHICLE};
 use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
-use quietpath_bridge::flight::settings::{FlyMode, PayloadEntry, PayloadKind, Replanning};
+use quietpath_bridge::flight::settings::{FlyMode, MissionOutput, PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Output, Settings};
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::codec::plain_bytes;
 use quietpath_bridge::link::dialect::*;
 use quietpath_bridge::link::{Frame, Identity};
+use quietpath_bridge::mission::Item;
 use quietpath_bridge::record::{Recorder, replay};
 use quietpath_bridge::replan::{Answer, Job, Observation};
 use quietpath_bridge::telemetry::{Airframe, Autopilot, Mode, mode_command};
@@ -62,7 +63,7 @@ fn plan() -> PlanFile {
 }
 
 fn settings(mode: FlyMode) -> Settings {
-    let entry = |kind, component| PayloadEntry { kind, component, instance: 0 };
+    let entry = |kind, component| PayloadEntry { kind, component, instance: 0, mission_output: None };
     let payload = vec![entry(PayloadKind::Transmitter, 25), entry(PayloadKind::Jammer, 26)];
     Settings { mode, payload, jammer_armed: true, ..Settings::default() }
 }
@@ -82,6 +83,7 @@ struct World {
     silent: bool,
     level: Option<f32>,
     power: Option<f32>,
+    servo: Option<f32>,
     setpoints: Vec<(u64, SET_POSITION_TARGET_GLOBAL_INT_DATA)>,
     jobs: Vec<Job>,
     said: Vec<String>,
@@ -106,6 +108,7 @@ impl World {
             silent: false,
             level: None,
             power: None,
+            servo: None,
             setpoints: Vec::new(),
             jobs: Vec::new(),
             said: Vec::new(),
@@ -200,6 +203,7 @@ impl World {
                 assert!(data.param2 == 0.0 || data.param3 == 0.0, "to the north");
                 return self.level = Some(data.param2);
             }
+            MavCmd::MAV_CMD_DO_SET_SERVO => self.servo = Some(data.param2),
             MavCmd::MAV_CMD_DO_SET_MODE if !self.refuses_modes => {
                 let (main, sub) = (data.param2 as u32, data.param3 as u32);
                 self.custom_mode = if self.kind == Autopilot::Px4 { main << 16 | sub << 24 } else { main };
@@ -318,6 +322,25 @@ fn a_mission_is_delivered_flown_and_scheduled_by_its_items() {
         world.pass(1.0);
         assert_eq!(world.end, Some(End::Done));
     }
+}
+
+#[test]
+fn a_payload_on_an_output_is_switched_by_the_mission_and_off_at_the_end() {
+    let output = MissionOutput { output: 9, off: 1000.0, full: 2000.0 };
+    let entry = PayloadEntry { kind: PayloadKind::Jammer, component: 26, instance: 0, mission_output: Some(output) };
+    let settings = Settings { payload: vec![entry], ..settings(FlyMode::Mission) };
+    let mut world = World::new(Autopilot::ArduPilot, settings);
+    world.begin(FlyMode::Mission);
+    let servo = |item: &&Item| item.command == MavCmd::MAV_CMD_DO_SET_SERVO;
+    let set: Vec<f32> = world.missions.lists[0].iter().filter(servo).map(|item| item.params[1]).collect();
+    assert_eq!(set, [1500.0, 1000.0]);
+    // The waypoint of node 10 is one further down: the jammer was switched on before node 5.
+    world.current = Some(1 + 2 + 10 + 1);
+    world.pass(1.0);
+    assert_eq!((world.level, world.servo), (Some(0.5), None), "{:?}", world.said);
+    world.mode(Mode::Hold);
+    world.pass(1.0);
+    assert_eq!((world.level, world.servo), (Some(0.0), Some(1000.0)), "a person took over");
 }
 
 /// Every way in which jamming must end, each from the middle of a flight that jams.

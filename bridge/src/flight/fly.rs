@@ -1,14 +1,12 @@
 //! The flight itself: along the plan, to the next plan, and out of it.
 
 use crate::command::Command;
-use crate::mission::item::mission_items;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
 use crate::replan::job::{Rejected, judge, rest};
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
-use super::prepare::item_nodes;
 use super::settings::{FlyMode, OnFailure};
 use super::{End, Flight, Flying, Level, Output, Phase};
 
@@ -113,8 +111,8 @@ impl Flight {
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
         };
         mission.items.drain(..BEHIND.min(mission.items.len()));
-        let items = mission_items(vehicle.autopilot, &mission);
-        next.nodes = item_nodes(&items, vehicle.autopilot == Autopilot::ArduPilot, 1);
+        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 1);
+        next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
         self.next = Some(next);

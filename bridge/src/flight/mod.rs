@@ -27,6 +27,7 @@ mod emission;
 mod fly;
 mod guard;
 mod prepare;
+mod schedule;
 pub mod settings;
 
 use std::time::Duration;
@@ -41,7 +42,7 @@ use crate::link::codec::companion_heartbeat;
 use crate::link::dialect::MavMessage;
 use crate::link::{Frame, Identity};
 use crate::mission::{Delivery, Download, Item, List, Pace, Talk, Watch};
-use crate::payload::Relay;
+use crate::payload::{Radiation, Relay};
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
@@ -152,6 +153,7 @@ pub struct Flight {
     timesync: Timesync,
     round_trip: Option<Duration>,
     relay: Relay,
+    radiation: Radiation,
     watch: Option<Watch>,
     /// What the autopilot holds of ours, and a look whether it still does.
     kept: Vec<Item>,
@@ -220,6 +222,7 @@ impl Flight {
             timesync: Timesync::default(),
             round_trip: None,
             relay,
+            radiation,
             watch: None,
             kept: Vec::new(),
             check: None,
@@ -284,6 +287,8 @@ impl Flight {
         let mut out = Vec::new();
         if let Some(vehicle) = self.telemetry.vehicle() {
             self.relay.silence(vehicle.identity, &mut out);
+            let quiet = schedule::quiet(vehicle.autopilot, &self.settings.payload, self.radiation);
+            out.extend(quiet.iter().map(|command| command.long(vehicle.identity, 0)));
         }
         out
     }

@@ -13,7 +13,7 @@ use crate::setpoint::{Sample, Steering, target};
 use crate::telemetry::{Airframe, Autopilot, Flying as InAir, Mode, Vehicle};
 
 use super::settings::FlyMode;
-use super::{End, Flight, Level, Phase};
+use super::{End, Flight, Level, Phase, schedule};
 
 /// Height above home from which on a vehicle that does not say so counts as flying, m.
 const HEIGHT_MIN: f64 = 1.0;
@@ -23,7 +23,7 @@ const STREAM_FIRST: Duration = Duration::from_secs(1);
 const SPEED_MAX: f64 = 1.0;
 
 /// For each item of a mission on the wire the node that it flies to.
-pub(super) fn item_nodes(items: &[Item], has_home: bool, first: usize) -> Vec<usize> {
+fn item_nodes(items: &[Item], has_home: bool, first: usize) -> Vec<usize> {
     let mut waypoints = 0;
     let node = |(index, item): (usize, &Item)| {
         let at = first + waypoints;
@@ -42,6 +42,25 @@ impl Flight {
         all.into_iter().find(|mission| mission.agent == self.agent).ok_or_else(|| "has no such agent".to_owned())
     }
 
+    /// A mission as the autopilot takes it, with the items that switch payloads, and for each item the node that it flies
+    /// to. `first` is the node of the first waypoint.
+    pub(super) fn wire_mission(
+        &self,
+        vehicle: &Vehicle,
+        mission: &Mission,
+        plan: &crate::file::PlanFile,
+        first: usize,
+    ) -> (Vec<Item>, Vec<usize>) {
+        let has_home = vehicle.autopilot == Autopilot::ArduPilot;
+        let items = mission_items(vehicle.autopilot, mission);
+        let nodes = item_nodes(&items, has_home, first);
+        let Some(agent) = plan.agents.iter().find(|agent| agent.name == self.agent) else { return (items, nodes) };
+        let payloads = &self.settings.payload;
+        let items = schedule::insert(vehicle.autopilot, items, &nodes, payloads, self.radiation, agent);
+        let nodes = item_nodes(&items, has_home, first);
+        (items, nodes)
+    }
+
     pub(super) fn begin_delivery(&mut self, vehicle: &Vehicle) {
         if self.settings.mode == FlyMode::Guided
             && (vehicle.autopilot, vehicle.airframe) == (Autopilot::ArduPilot, Airframe::Plane)
@@ -55,8 +74,8 @@ impl Flight {
         };
         let mut waiting = Vec::new();
         if self.settings.mode == FlyMode::Mission {
-            let items = mission_items(vehicle.autopilot, &mission);
-            self.flying.nodes = item_nodes(&items, vehicle.autopilot == Autopilot::ArduPilot, 0);
+            let (items, nodes) = self.wire_mission(vehicle, &mission, &self.flying.plan, 0);
+            self.flying.nodes = nodes;
             waiting.push((List::Mission, items));
         }
         if self.settings.rally {

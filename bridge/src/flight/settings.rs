@@ -78,8 +78,20 @@ impl Default for Replanning {
     }
 }
 
+/// An output of the autopilot that a payload hangs on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MissionOutput {
+    /// Number of the servo (ArduPilot) or actuator (PX4, 1 to 4).
+    pub output: u8,
+    /// Value at level 0: microseconds (ArduPilot), -1 to 1 (PX4).
+    pub off: f64,
+    /// Value at level 1.
+    pub full: f64,
+}
+
 /// A payload, as the configuration names it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PayloadEntry {
     /// `transmitter` or `jammer`.
@@ -89,6 +101,9 @@ pub struct PayloadEntry {
     /// Number on that component.
     #[serde(default)]
     pub instance: u8,
+    /// Switch this output by items of the mission too: see `docs/bridge.md` for what that cannot do.
+    #[serde(default)]
+    pub mission_output: Option<MissionOutput>,
 }
 
 /// What a payload does.

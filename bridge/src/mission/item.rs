@@ -131,8 +131,9 @@ impl Item {
         let has_place = navigates || (5000..=5100).contains(&(self.command as u32));
         self.command == kept.command
             && self.params.iter().zip(&kept.params).all(|(sent, kept)| param(*sent, *kept))
-            && self.x.abs_diff(kept.x) <= PLACE_TOLERANCE.unsigned_abs()
-            && self.y.abs_diff(kept.y) <= PLACE_TOLERANCE.unsigned_abs()
+            // Numbers that stand for "not given" are not kept.
+            && (self.x == i32::MAX || self.x.abs_diff(kept.x) <= PLACE_TOLERANCE.unsigned_abs())
+            && (self.y == i32::MAX || self.y.abs_diff(kept.y) <= PLACE_TOLERANCE.unsigned_abs())
             && (self.z - kept.z).abs() <= ALTITUDE_TOLERANCE
             && (!has_place || plain_frame(self.frame) == plain_frame(kept.frame))
     }

@@ -234,7 +234,8 @@ mod tests {
         let agent =
             AgentPlan { name: scenario.agents[0].name.clone(), path: vec![start, goal], ..AgentPlan::default() };
         let plan = PlanFile { duration: 100.0, agents: vec![agent], ..PlanFile::default() };
-        let payload = vec![PayloadEntry { kind: PayloadKind::Jammer, component: 26, instance: 0 }];
+        let payload =
+            vec![PayloadEntry { kind: PayloadKind::Jammer, component: 26, instance: 0, mission_output: None }];
         let settings = Settings { payload, jammer_armed: true, ..Settings::default() };
         let mut flight = Flight::new(&scenario, &plan, settings).expect("a flight");
         let (mavtype, autopilot) = (MavType::MAV_TYPE_QUADROTOR, MavAutopilot::MAV_AUTOPILOT_PX4);
