@@ -1,4 +1,4 @@
-//! The program with other people's MAVLink: pymavlink plays the vehicle, and reads our files.
+//! The program with other people's MAVLink: pymavlink and MAVSDK play the vehicle, and pymavlink reads our files.
 //!
 //! These tests make a Python environment under `target/` and fill it from PyPI, so they run where they are asked for:
 //! `cargo xtask test`, or `cargo test -p quietpath-bridge --test interoperate -- --ignored`.
@@ -16,24 +16,24 @@ use std::time::Duration;
 use serde_json::Value;
 use shared::{Folder, free_port, program, run, terminate};
 
-const PYMAVLINK: &str = "pymavlink==2.4.50";
+const PACKAGES: [&str; 2] = ["pymavlink==2.4.50", "mavsdk==4.1.0"];
 const KEY: &str = "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff";
 
-/// The Python of an environment that has pymavlink.
+/// The Python of an environment that has both.
 fn python() -> &'static Path {
     static PYTHON: OnceLock<PathBuf> = OnceLock::new();
     PYTHON.get_or_init(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pymavlink");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mavlink");
         let python = folder.join("bin/python");
         let has = |python: &Path| {
-            let probe = Command::new(python).args(["-c", "import pymavlink"]).stderr(Stdio::null()).status();
+            let probe = Command::new(python).args(["-c", "import pymavlink, mavsdk"]).stderr(Stdio::null()).status();
             probe.is_ok_and(|status| status.success())
         };
         if !has(&python) {
             succeed(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder));
-            succeed(Command::new(folder.join("bin/pip")).args(["install", "--quiet", PYMAVLINK]));
+            succeed(Command::new(folder.join("bin/pip")).args(["install", "--quiet"]).args(PACKAGES));
         }
-        assert!(has(&python), "{} has no pymavlink", python.display());
+        assert!(has(&python), "{} lacks pymavlink or mavsdk", python.display());
         python
     })
 }
@@ -47,13 +47,13 @@ fn script(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interoperate").join(name)
 }
 
-/// A vehicle by pymavlink; ended where it is dropped.
+/// A vehicle by one of the scripts; ended where it is dropped.
 struct Vehicle(Option<Child>);
 
 impl Vehicle {
-    fn start(port: u16, key: Option<&str>) -> Self {
+    fn start(program: &str, port: u16, key: Option<&str>) -> Self {
         let mut command = Command::new(python());
-        command.arg(script("vehicle.py")).arg(port.to_string()).args(key);
+        command.arg(script(program)).arg(port.to_string()).args(key);
         Self(Some(command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("Python runs")))
     }
 
@@ -64,7 +64,9 @@ impl Vehicle {
         input.write_all(b"\n").expect("it reads");
         drop(input);
         let output = child.wait_with_output().expect("it ends");
-        serde_json::from_slice(&output.stdout).expect("a line of JSON")
+        // Libraries chat on standard output too: the line of JSON is the last.
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        serde_json::from_str(text.lines().last().unwrap_or_default()).expect("a line of JSON")
     }
 }
 
@@ -87,7 +89,7 @@ fn pymavlink_receives_missions_and_fences_and_gives_them_back() {
         std::fs::set_permissions(&key_file, std::os::unix::fs::PermissionsExt::from_mode(0o600))
             .expect("permissions");
         let port = free_port();
-        let vehicle = Vehicle::start(port, key);
+        let vehicle = Vehicle::start("vehicle.py", port, key);
         let link = format!("udpin:127.0.0.1:{port}");
         let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
         let signing = ["--signing-key", key_file.as_str()];
@@ -120,7 +122,7 @@ fn pymavlink_receives_missions_and_fences_and_gives_them_back() {
 fn pymavlink_reads_our_waypoints_and_logs() {
     let folder = Folder::new();
     let port = free_port();
-    let _vehicle = Vehicle::start(port, None);
+    let _vehicle = Vehicle::start("vehicle.py", port, None);
     let link = format!("udpin:127.0.0.1:{port}");
     let (scenario, plan, record) =
         (folder.path("scenario.toml"), folder.path("plan.json"), folder.path("flight.jsonl"));
@@ -141,4 +143,23 @@ fn pymavlink_reads_our_waypoints_and_logs() {
     assert!((read["x"].as_f64().expect("a latitude") - 47.4).abs() < 0.01, "{read}");
     let heartbeats = read["kinds"]["HEARTBEAT"].as_u64().expect("heartbeats");
     assert!(heartbeats > 10 && read["kinds"]["MISSION_ITEM_INT"].as_u64() > Some(10), "{read}");
+}
+
+#[test]
+#[ignore = "makes a Python environment"]
+fn mavsdk_receives_a_mission_and_gives_it_back() {
+    let folder = Folder::new();
+    let port = free_port();
+    let vehicle = Vehicle::start("mavsdk_vehicle.py", port, None);
+    let link = format!("udpin:127.0.0.1:{port}");
+    let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
+    // MAVSDK does not say which autopilot it is.
+    let arguments = ["upload", "--link", &link, "--scenario", &scenario, "--plan", &plan, "--autopilot", "px4"];
+    let (status, out, err) = run(&arguments);
+    assert_eq!(status, 0, "{out}{err}");
+    assert!(out.contains("the mission: 7 items, read back"), "{out}");
+    let got = vehicle.end();
+    let mission = got["got"].as_array().and_then(|missions| missions.first()).expect("a mission");
+    let commands: Vec<u64> = mission.as_array().expect("a list").iter().filter_map(|item| item[0].as_u64()).collect();
+    assert_eq!(commands, [22, 16, 178, 16, 16, 16, 16], "{got}");
 }

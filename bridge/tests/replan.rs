@@ -47,7 +47,7 @@ fn answer(job: &Job) -> Answer {
 #[test]
 fn the_rest_is_planned_around_a_sensor_that_moved_and_takes_over_smoothly() {
     let (mut world, mut flying) = begin();
-    let seen = "{\"id\": \"s1\", \"position\": [12.0, 13.0]}";
+    let seen = "{\"id\": \"s1\", \"position\": [14.0, 18.0]}";
     for (step, seam) in [8.0, 15.0, 22.0].into_iter().enumerate() {
         if step == 1 {
             Observation::parse(seen).expect("read").apply(&mut world, seam, 1.0).expect("applied");
@@ -70,7 +70,7 @@ fn the_rest_is_planned_around_a_sensor_that_moved_and_takes_over_smoothly() {
         assert!(tail.feasible, "flying on is a plan: {:?}", tail.worst);
         assert!(assessed.objective <= tail.objective + 1e-9, "no worse than flying on");
         if step == 1 {
-            assert!(assessed.objective < 0.9 * tail.objective, "{} {}", assessed.objective, tail.objective);
+            assert!(assessed.objective < 0.95 * tail.objective, "{} {}", assessed.objective, tail.objective);
         }
         flying = plan;
     }

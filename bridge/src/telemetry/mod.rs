@@ -85,7 +85,7 @@ pub enum Choice {
     /// By its heartbeat.
     #[default]
     Auto,
-    /// Only this kind: another one is not taken.
+    /// Only this kind, and one that does not say its kind: another one is not taken.
     Only(Autopilot),
 }
 
@@ -150,9 +150,11 @@ impl Telemetry {
     }
 
     fn heartbeat(&mut self, now: Time, from: Identity, data: &HEARTBEAT_DATA) -> bool {
-        let autopilot = match data.autopilot {
-            MavAutopilot::MAV_AUTOPILOT_PX4 => Autopilot::Px4,
-            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => Autopilot::ArduPilot,
+        let autopilot = match (data.autopilot, self.choice) {
+            (MavAutopilot::MAV_AUTOPILOT_PX4, _) => Autopilot::Px4,
+            (MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA, _) => Autopilot::ArduPilot,
+            // One that does not say is what it is chosen to be.
+            (MavAutopilot::MAV_AUTOPILOT_GENERIC, Choice::Only(autopilot)) => autopilot,
             _ => return false,
         };
         let is_vehicle = !matches!(data.mavtype, MavType::MAV_TYPE_GCS | MavType::MAV_TYPE_ONBOARD_CONTROLLER);
@@ -220,5 +222,8 @@ mod tests {
         assert!(!telemetry.handle(Time::ZERO, &frame(1, 1, px4.clone())));
         assert!(!Telemetry::new(Choice::Auto, Some(2)).handle(Time::ZERO, &frame(1, 1, px4.clone())));
         assert!(Telemetry::new(Choice::Only(Autopilot::Px4), Some(1)).handle(Time::ZERO, &frame(1, 1, px4)));
+        let silent = frame(1, 1, heartbeat(MavType::MAV_TYPE_GENERIC, MavAutopilot::MAV_AUTOPILOT_GENERIC, 0));
+        assert!(!Telemetry::new(Choice::Auto, None).handle(Time::ZERO, &silent), "it may be anything");
+        assert!(Telemetry::new(Choice::Only(Autopilot::ArduPilot), None).handle(Time::ZERO, &silent));
     }
 }
