@@ -8,8 +8,7 @@
 //! | `MAV_CMD_USER_2`, jamming | instance | level, 0 to 1 | azimuth, degrees clockwise from north | elevation, degrees | time to live, s |
 //!
 //! Each is repeated every [`REFRESH`] with a time to live: a payload that hears nothing for that long falls silent, or
-//! goes back to full power, by itself. The answer is taken note of, and not waited for: the next repetition is the
-//! resend.
+//! goes back to full power, by itself. Nobody waits for the answer: the next repetition is the resend.
 //!
 //! **Radiating.** No jamming command leaves the bridge unless [`Radiation::Armed`], which needs both the switch on the
 //! command line and the word of the scenario. And then: whoever calls [`Relay::poll`] without an emission gets level 0
@@ -75,22 +74,16 @@ pub struct Relay {
     radiation: Radiation,
     sent: Option<Time>,
     last: Option<Emission>,
-    /// When each payload last accepted a command.
-    accepted: Vec<Option<Time>>,
+    /// What each payload answered last.
+    answers: Vec<Option<MavResult>>,
 }
 
 impl Relay {
     /// A relay to some payloads.
     #[must_use]
     pub fn new(payloads: Vec<Payload>, radiation: Radiation) -> Self {
-        let accepted = vec![None; payloads.len()];
-        Self { payloads, radiation, sent: None, last: None, accepted }
-    }
-
-    /// Whether every payload that hears from the bridge has answered within `span`.
-    #[must_use]
-    pub fn is_heard(&self, now: Time, span: Duration) -> bool {
-        self.accepted.iter().all(|accepted| accepted.is_some_and(|at| now.since(at) <= span))
+        let answers = vec![None; payloads.len()];
+        Self { payloads, radiation, sent: None, last: None, answers }
     }
 
     /// What is being emitted; `None` for nothing.
@@ -99,18 +92,19 @@ impl Relay {
         self.last
     }
 
-    /// Takes a message of the link.
-    pub fn handle(&mut self, now: Time, frame: &Frame) {
-        let MavMessage::COMMAND_ACK(ack) = &frame.message else { return };
-        for (payload, accepted) in self.payloads.iter().zip(&mut self.accepted) {
+    /// Takes a message of the link; what to tell people where a payload answers otherwise than before.
+    pub fn handle(&mut self, frame: &Frame) -> Option<String> {
+        let MavMessage::COMMAND_ACK(ack) = &frame.message else { return None };
+        let answers = |payload: &Payload| {
             let command = match payload.kind {
                 Kind::Transmitter => MavCmd::MAV_CMD_USER_1,
                 Kind::Jammer => MavCmd::MAV_CMD_USER_2,
             };
-            if frame.from.component == payload.component && ack.command == command {
-                *accepted = (ack.result == MavResult::MAV_RESULT_ACCEPTED).then_some(now);
-            }
-        }
+            frame.from.component == payload.component && ack.command == command
+        };
+        let (payload, last) = self.payloads.iter().zip(&mut self.answers).find(|(payload, _)| answers(payload))?;
+        let is_news = last.replace(ack.result) != Some(ack.result);
+        is_news.then(|| format!("the payload at component {} answers {:?}", payload.component, ack.result))
     }
 
     /// Sends what is due. Without an emission, or with one that is not finite: level 0 and full power.
@@ -199,6 +193,23 @@ mod tests {
         assert_eq!(out, [], "not a number is nothing, and nothing has been said");
         relay.poll(Time::from_millis(1200), VEHICLE, Some(Emission { level: f64::NAN, ..JAM }), &mut out);
         assert_eq!(levels(&out), off);
+    }
+
+    #[test]
+    fn an_answer_is_news_once() {
+        use crate::link::dialect::COMMAND_ACK_DATA;
+        let mut relay = relay(Radiation::Armed);
+        let mut answer = |component, command, result| {
+            let ack = COMMAND_ACK_DATA { command, result, ..Default::default() };
+            let from = Identity { system: 1, component };
+            relay.handle(&Frame { from, sequence: 0, message: MavMessage::COMMAND_ACK(ack), bytes: Vec::new() })
+        };
+        let (power, accepted) = (MavCmd::MAV_CMD_USER_1, MavResult::MAV_RESULT_ACCEPTED);
+        assert_eq!(answer(26, power, accepted), None, "that component is the jammer");
+        let news = "the payload at component 25 answers MAV_RESULT_ACCEPTED";
+        assert_eq!(answer(25, power, accepted).as_deref(), Some(news));
+        assert_eq!(answer(25, power, accepted), None);
+        assert!(answer(25, power, MavResult::MAV_RESULT_DENIED).is_some());
     }
 
     #[test]

@@ -62,7 +62,9 @@ fn every_equation_has_one_row_with_a_file_and_a_test_that_exist() {
 
 #[test]
 fn paths_and_pictures_on_the_pages_exist() {
-    for name in ["README.md", "ARCHITECTURE.md", "DESIGN.md", "CONTRIBUTING.md", "docs/equations.md"] {
+    for name in
+        ["README.md", "ARCHITECTURE.md", "DESIGN.md", "CONTRIBUTING.md", "docs/equations.md", "docs/bridge.md"]
+    {
         let text = page(name);
         let tops = ["core/", "bridge/", "sim/", "tests/", "xtask/", "docs/"];
         let paths =

@@ -146,7 +146,7 @@ impl Flight {
     }
 
     /// There is no plan to fly any more.
-    fn give_up(&mut self, why: String) {
+    pub(super) fn give_up(&mut self, why: String) {
         let is_steered = self.settings.mode == FlyMode::Guided;
         match self.settings.on_failure {
             OnFailure::Return => self.leave(Mode::Return, End::Failed(why)),

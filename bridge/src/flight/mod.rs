@@ -350,7 +350,9 @@ impl Flight {
         {
             self.say(Level::Warn, format!("{:?} was answered with {:?}", ended.command.command, ended.outcome));
         }
-        self.relay.handle(self.now, frame);
+        if let Some(answer) = self.relay.handle(frame) {
+            self.say(Level::Info, answer);
+        }
         if let Phase::Deliver { delivery, .. } = &mut self.phase {
             delivery.handle(self.now, frame, &mut out);
         }
@@ -412,6 +414,10 @@ impl Flight {
         if lost != self.link_lost {
             self.link_lost = lost;
             self.say(Level::Warn, if lost { "the vehicle is silent" } else { "the vehicle is heard again" });
+            if !lost && matches!(self.phase, Phase::Fly) && self.settings.mode == FlyMode::Guided {
+                // The plan has gone on without the vehicle: its setpoints are far ahead by now.
+                self.give_up("the vehicle was not heard while it was steered".into());
+            }
         }
         let mut out = Vec::new();
         self.timesync.poll(self.now, vehicle.identity, &mut out);

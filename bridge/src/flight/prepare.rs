@@ -68,6 +68,10 @@ impl Flight {
             let why = "ArduPlane does not follow setpoints along a path: fly it with --mode mission";
             return self.end(End::Failed(why.into()));
         }
+        if self.settings.mode == FlyMode::Mission && vehicle.armed && vehicle.mode == Mode::Mission {
+            // It would go on in the middle of another mission.
+            return self.end(End::Failed("the vehicle flies a mission already: change its mode first".into()));
+        }
         let mission = match self.mission_of(&self.flying.plan) {
             Ok(mission) => mission,
             Err(why) => return self.end(End::Failed(why)),
@@ -82,7 +86,8 @@ impl Flight {
             let start = self.frame.place(&self.flying.curve.sample(self.flying.curve.begin()).position);
             waiting.push((List::Rally, rally_items(&[above_home(start, vehicle)])));
         }
-        if self.settings.fence {
+        // Without regions there is nothing to say: a fence that somebody else has set stays.
+        if self.settings.fence && !mission.fences.is_empty() {
             waiting.push((List::Fence, fence_items(&mission.fences)));
         }
         self.next_delivery(vehicle, waiting);

@@ -27,7 +27,8 @@ fn try_upload(args: &UploadArgs) -> Result<(), Outcome> {
     let mut station = Station::find(&config)?;
     let items = mission_items(station.vehicle.autopilot, &mission);
     let mut lists = vec![(List::Mission, items)];
-    if config.flight.fence {
+    // Without regions there is nothing to say: a fence that somebody else has set stays.
+    if config.flight.fence && !mission.fences.is_empty() {
         lists.push((List::Fence, fence_items(&mission.fences)));
     }
     for (list, items) in lists {
