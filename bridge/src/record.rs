@@ -12,26 +12,34 @@
 //! `t` is in microseconds. [`replay`] feeds the inputs to a new flight and compares what comes out, text by text: frames
 //! are written unsigned and with sequence number 0, so that every bit of a message counts and the link does not.
 //!
+//! Every line is handed to the operating system as it is written, so a bridge that is killed loses nothing of it; a computer
+//! that loses power may lose what was not on the disk yet. Wherever a record ends, in the middle of a line too, it is
+//! replayed as far as it goes. A record is never written over: where the file is there already, the new one is
+//! `NAME-2`, `NAME-3` and so on. Keys are in neither file, and frames are recorded unsigned or with the signature they came
+//! with, which does not tell the key.
+//!
 //! A `.tlog` holds the frames of both directions, each behind its time in microseconds of Unix time, big-endian; ground
 //! stations read it.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
-use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Time;
 use crate::file::{FileError, PlanFile, ScenarioFile};
-use crate::flight::{Flight, Input, Output, Settings};
+use crate::flight::{Flight, Input, Journal, Output, Settings};
 use crate::link::codec::{Frame, Identity, plain_bytes};
 use crate::replan::{Answer, Observation};
 
 /// Version of the format.
 const VERSION: u32 = 1;
-/// How often the files are flushed.
-const FLUSH: Duration = Duration::from_secs(1);
+/// Longest line, bytes: the first holds the scenario and the plan.
+const LINE_MAX: usize = 64 << 20;
+/// Names that are tried for a record whose own is taken.
+const NAMES_MAX: u32 = 10_000;
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -41,6 +49,9 @@ struct Header {
     scenario_name: String,
     scenario: String,
     plan: PlanFile,
+    /// Where the flight was picked up, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    journal: Option<Journal>,
 }
 
 /// An input as it is written.
@@ -112,6 +123,10 @@ pub fn written(output: &Output) -> String {
         Output::Plan(job) => {
             format!("plan {} from {:?}: {} {:?}", job.number, job.seam, job.tail.to_json(), job.scenario.sensors)
         }
+        Output::Keep(None) => "keep nothing".to_owned(),
+        Output::Keep(Some(journal)) => {
+            format!("keep {}", serde_json::to_string(journal).unwrap_or_else(|error| error.to_string()))
+        }
         Output::Say(level, text) => format!("say {level:?} {text}"),
         Output::End(end) => format!("end {end:?}"),
     }
@@ -119,40 +134,56 @@ pub fn written(output: &Output) -> String {
 
 /// Writes a record and its `.tlog`.
 pub struct Recorder {
+    path: PathBuf,
     lines: BufWriter<File>,
     tlog: BufWriter<File>,
     /// Unix time at the clock's zero, microseconds.
     epoch: u64,
-    flushed: Time,
     has_failed: bool,
 }
 
+/// What a flight began with, and where it was picked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Beginning<'a> {
+    /// The scenario.
+    pub scenario: &'a ScenarioFile,
+    /// The plan.
+    pub plan: &'a PlanFile,
+    /// How to fly.
+    pub settings: &'a Settings,
+    /// Where it was picked up, if it was.
+    pub journal: Option<&'a Journal>,
+}
+
 impl Recorder {
-    /// Begins a record at `path`, and `path` with the extension `tlog`. `now` is the clock's time.
+    /// Begins a record at `path`, and `path` with the extension `tlog`; where either is there already, beside it:
+    /// [`Recorder::path`] says where. `now` is the clock's time.
     ///
     /// # Errors
     /// The files cannot be written.
-    pub fn create(
-        path: &Path,
-        scenario: &ScenarioFile,
-        plan: &PlanFile,
-        settings: &Settings,
-        now: Time,
-    ) -> io::Result<Self> {
-        let mut lines = BufWriter::new(File::create(path)?);
-        let tlog = BufWriter::new(File::create(path.with_extension("tlog"))?);
+    pub fn create(path: &Path, beginning: &Beginning<'_>, now: Time) -> io::Result<Self> {
+        let (path, lines, tlog) = unused(path)?;
+        let (mut lines, tlog) = (BufWriter::new(lines), BufWriter::new(tlog));
         let header = Header {
             quietpath_record: VERSION,
-            settings: settings.clone(),
-            scenario_name: scenario.file_name().to_owned(),
-            scenario: scenario.text().to_owned(),
-            plan: plan.clone(),
+            settings: beginning.settings.clone(),
+            scenario_name: beginning.scenario.file_name().to_owned(),
+            scenario: beginning.scenario.text().to_owned(),
+            plan: beginning.plan.clone(),
+            journal: beginning.journal.cloned(),
         };
         serde_json::to_writer(&mut lines, &header)?;
         writeln!(lines)?;
+        lines.flush()?;
         let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let epoch = u64::try_from(unix.as_micros()).unwrap_or(u64::MAX).saturating_sub(now.micros());
-        Ok(Self { lines, tlog, epoch, flushed: now, has_failed: false })
+        Ok(Self { path, lines, tlog, epoch, has_failed: false })
+    }
+
+    /// Where the record is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Writes an input and what came out of it.
@@ -163,11 +194,9 @@ impl Recorder {
             self.frame(now, &frame.bytes);
         }
         self.note(result);
-        if now.since(self.flushed) >= FLUSH {
-            self.flushed = now;
-            let result = self.lines.flush().and_then(|()| self.tlog.flush());
-            self.note(result);
-        }
+        // A bridge that is killed has told the operating system everything.
+        let result = self.lines.flush().and_then(|()| self.tlog.flush());
+        self.note(result);
     }
 
     fn try_write(&mut self, line: &Line) -> io::Result<()> {
@@ -193,6 +222,45 @@ impl Recorder {
     }
 }
 
+/// New files for a record: at `path`, or beside it where that is taken.
+fn unused(path: &Path) -> io::Result<(PathBuf, File, File)> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    for number in 1..=NAMES_MAX {
+        let mut beside = path.to_owned();
+        if number > 1 {
+            let extension = path.extension().map(|extension| format!(".{}", extension.to_string_lossy()));
+            beside.set_file_name(format!("{stem}-{number}{}", extension.unwrap_or_default()));
+        }
+        let create = |path: &Path| File::options().write(true).create_new(true).open(path);
+        let is_taken = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
+        // Both or none: a .tlog alone would be taken for the frames of another record.
+        if beside.with_extension("tlog").exists() {
+            continue;
+        }
+        match create(&beside) {
+            Ok(lines) => {
+                let tlog = create(&beside.with_extension("tlog"))?;
+                return Ok((beside, lines, tlog));
+            }
+            Err(error) if is_taken(&error) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{NAMES_MAX} records of that name are there")))
+}
+
+/// Where a record ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// With a whole line.
+    Whole,
+    /// In the middle of this line, counted from 1: the program was killed or the power was lost.
+    Cut {
+        /// The line.
+        line: usize,
+    },
+}
+
 /// What a replay found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replayed {
@@ -200,9 +268,25 @@ pub struct Replayed {
     pub inputs: usize,
     /// Outputs that were the same, bit for bit.
     pub outputs: usize,
+    /// Time of the last input.
+    pub last: Time,
+    /// Where the record ends.
+    pub ending: Ending,
 }
 
-/// Feeds a record to a new flight; `each` gets every input's time and outputs.
+/// A line of a record, without its end; `None` behind the last. Whether it has an end comes with it.
+fn line(file: &mut impl BufRead) -> io::Result<Option<(Vec<u8>, bool)>> {
+    let mut bytes = Vec::new();
+    let count = file.by_ref().take(LINE_MAX as u64).read_until(b'\n', &mut bytes)?;
+    if count >= LINE_MAX && bytes.last() != Some(&b'\n') {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("it has more than {LINE_MAX} bytes")));
+    }
+    let is_whole = bytes.pop_if(|byte| *byte == b'\n').is_some();
+    Ok((count > 0).then_some((bytes, is_whole)))
+}
+
+/// Feeds a record to a new flight; `each` gets every input's time and outputs. A record that was cut off is replayed as
+/// far as it goes.
 ///
 /// # Errors
 /// A file that is no record; the first line whose outputs differ, with both.
@@ -213,36 +297,45 @@ pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Repl
     };
     let record = "give the file that `quietpath-bridge run --record` wrote";
     let file = File::open(path).map_err(|error| fail(1, format!("cannot be read: {error}"), record))?;
-    let mut lines = BufReader::new(file).lines().enumerate();
-    let first = lines.next().and_then(|(_, line)| line.ok()).unwrap_or_default();
-    let header: Header =
-        serde_json::from_str(&first).map_err(|error| fail(1, format!("is no record: {error}"), record))?;
+    let mut file = BufReader::new(file);
+    let unreadable = |number: usize, error: &io::Error| fail(number, format!("cannot be read: {error}"), record);
+    let (first, is_whole) = line(&mut file).map_err(|error| unreadable(1, &error))?.unwrap_or_default();
+    let header: Header = serde_json::from_slice(&first).map_err(|error| match error.is_eof() && !is_whole {
+        true => fail(1, "ends before the flight begins".into(), "the program was killed at once: nothing is lost"),
+        false => fail(1, format!("is no record: {error}"), record),
+    })?;
     if header.quietpath_record != VERSION {
         let message = format!("is a record of version {}, and this program reads {VERSION}", header.quietpath_record);
         return Err(fail(1, message, "replay it with the program that wrote it"));
     }
     let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
     let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
-    let mut replayed = Replayed { inputs: 0, outputs: 0 };
-    for (index, line) in lines {
-        let line = line.map_err(|error| fail(index + 1, format!("cannot be read: {error}"), record))?;
-        let parsed: Result<Line, _> = serde_json::from_str(&line);
+    if let Some(journal) = header.journal {
+        flight = flight.resuming(journal).map_err(|why| fail(1, format!("holds a journal that does not fit: {why}"), record))?;
+    }
+    let mut replayed = Replayed { inputs: 0, outputs: 0, last: Time::ZERO, ending: Ending::Whole };
+    for number in 2.. {
+        let Some((text, is_whole)) = line(&mut file).map_err(|error| unreadable(number, &error))? else { break };
+        let parsed: Result<Line, _> = serde_json::from_slice(&text);
         let Line { t, input, output } = match parsed {
             Ok(line) => line,
-            // A record that ends in the middle of a line was cut off by a loss of power.
-            Err(error) if error.is_eof() => break,
-            Err(error) => return Err(fail(index + 1, format!("is broken: {error}"), record)),
+            Err(_) if !is_whole => {
+                replayed.ending = Ending::Cut { line: number };
+                break;
+            }
+            Err(error) => return Err(fail(number, format!("is broken: {error}"), record)),
         };
         let input =
-            input.and_then(Written::into_input).ok_or_else(|| fail(index + 1, "holds no input".into(), record))?;
+            input.and_then(Written::into_input).ok_or_else(|| fail(number, "holds no input".into(), record))?;
         let outputs: Vec<String> = flight.step(t, input).iter().map(written).collect();
         let recorded = output.unwrap_or_default();
         if outputs != recorded {
             let message = format!("came out differently\n  then {recorded:?}\n  now  {outputs:?}");
-            return Err(fail(index + 1, message, "the program is another one than the one that flew"));
+            return Err(fail(number, message, "the program is another one than the one that flew"));
         }
         replayed.inputs += 1;
         replayed.outputs += outputs.len();
+        replayed.last = t;
         each(t, &outputs);
     }
     Ok(replayed)

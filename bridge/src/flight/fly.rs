@@ -12,8 +12,6 @@ use super::{End, Flight, Flying, Level, Output, Phase};
 
 /// Time after the last node in which a steered vehicle settles, s.
 const SETTLE: f64 = 2.0;
-/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
-const BEHIND: usize = 2;
 
 impl Flight {
     pub(super) fn fly(&mut self, vehicle: &Vehicle) {
@@ -36,7 +34,7 @@ impl Flight {
         let time = self.scenario_time();
         if let Some(next) = self.next.take_if(|next| next.curve.begin() <= time) {
             self.say(Level::Info, format!("the plan of {:.1} s flies", next.curve.begin()));
-            self.flying = next;
+            self.take_over(next);
         }
         match self.settings.mode {
             FlyMode::Guided => {
@@ -79,6 +77,7 @@ impl Flight {
         let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, time + replan.lead_s) else {
             // Too little is left: the plan is good to its end.
             self.flying.made = time;
+            self.keep();
             return;
         };
         self.jobs += 1;
@@ -93,7 +92,13 @@ impl Flight {
             Err(Rejected::Stale) => self.job = Some((job, asked)),
             Err(why) => self.say(Level::Warn, format!("the plan for {:.1} s does not fly: {why}", job.seam)),
             Ok((plan, curve)) if matches!(self.phase, Phase::Fly) => {
-                let next = Flying { plan, curve, made: time, nodes: Vec::new() };
+                let agent = job.scenario.agents.first();
+                let left = (
+                    agent.and_then(|agent| agent.jammer).map(|jammer| jammer.budget),
+                    agent.and_then(|agent| agent.dropout).map(|dropout| dropout.budget),
+                );
+                let is_rest = self.settings.mode == FlyMode::Mission;
+                let next = Flying { plan, curve, made: time, nodes: Vec::new(), left, is_rest };
                 match self.settings.mode {
                     FlyMode::Guided => self.next = Some(next),
                     FlyMode::Mission => self.begin_update(next),
@@ -106,12 +111,10 @@ impl Flight {
     /// Sends the rest of the mission by a new plan.
     fn begin_update(&mut self, mut next: Flying) {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
-        let mut mission = match self.mission_of(&next.plan) {
-            Ok(mission) => mission,
+        let (items, nodes) = match self.items_of(&vehicle, &next.plan, true) {
+            Ok(both) => both,
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
         };
-        mission.items.drain(..BEHIND.min(mission.items.len()));
-        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 1);
         next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
@@ -133,7 +136,7 @@ impl Flight {
                 let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
                 self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
                 if let Some(next) = self.next.take() {
-                    self.flying = next;
+                    self.take_over(next);
                     self.item = Some((first, self.now));
                 }
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
