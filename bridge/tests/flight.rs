@@ -11,7 +11,7 @@ use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::Identity;
 use quietpath_bridge::link::dialect::*;
 use quietpath_bridge::mission::Item;
-use quietpath_bridge::record::{Recorder, replay};
+use quietpath_bridge::record::{Beginning, Recorder, replay};
 use quietpath_bridge::replan::{Answer, Observation};
 use quietpath_bridge::telemetry::{Autopilot, Mode};
 
@@ -331,7 +331,9 @@ fn a_recorded_flight_replays_bit_for_bit_and_a_changed_one_does_not() {
     let path = folder.path().join("flight.jsonl");
     let settings = replanning(FlyMode::Guided);
     let mut world = World::new(Autopilot::Px4, settings.clone());
-    let recorder = Recorder::create(&path, &scenario(), &plan(), &settings, Time::ZERO);
+    let (scenario, plan) = (scenario(), plan());
+    let beginning = Beginning { scenario: &scenario, plan: &plan, settings: &settings, journal: None };
+    let recorder = Recorder::create(&path, &beginning, Time::ZERO);
     world.recorder = Some(recorder.expect("a record"));
     world.begin(FlyMode::Guided);
     let seen = Observation::parse("{\"id\": \"s1\", \"position\": [9.5, 5.5]}").expect("an observation");

@@ -1,9 +1,11 @@
 //! What holds for every problem, on problems drawn at random.
 //!
 //! Metrics are asked at single nodes, so that nothing but the model is asked. Optima are compared with tolerance, because
-//! the planner is local: from the plan of the tighter problem it must never come out worse in the wider one.
+//! the planner is local: from the plan of the tighter problem it must never come out worse in the wider one. Every run draws
+//! the same cases; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` draw others, and more.
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use quietpath_core::constraints::{TOLERANCE, violations};
 use quietpath_core::horizon::{Horizon, Search};
 use quietpath_core::metrics::{Sample, Values};
@@ -58,6 +60,14 @@ impl Problem {
         (track.path[3], track.jam[3], track.azimuth[3], track.dropout[3]) = (place, jam, azimuth, dropout);
         node_values(&world.view(), &path, 0, 3, &mut [Sample::default(); 6])
     }
+}
+
+fn config(cases: u32) -> ProptestConfig {
+    let given = ProptestConfig::default();
+    let cases = if std::env::var_os("PROPTEST_CASES").is_some() { given.cases } else { cases };
+    let is_given = std::env::var_os("PROPTEST_RNG_SEED").is_some();
+    let rng_seed = if is_given { given.rng_seed } else { RngSeed::Fixed(8) };
+    ProptestConfig { cases, rng_seed, failure_persistence: None, ..given }
 }
 
 fn place() -> impl Strategy<Value = Flat> {
@@ -153,7 +163,7 @@ fn best(problem: &Problem, start: Start<'_, f64, 2, 13, 1>) -> (Status, f64, Pat
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(512))]
 
     #[test]
     fn figures_do_not_depend_on_the_origin_nor_on_where_east_is(
@@ -219,7 +229,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(config(24))]
 
     #[test]
     fn a_larger_budget_or_a_later_deadline_never_gives_a_worse_plan(

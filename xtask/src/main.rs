@@ -1,9 +1,11 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `count`.
+//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `count`,
+//! `fuzz`, `numbers`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
 
 mod count;
+mod fuzz;
 mod step;
 
 use std::path::Path;
@@ -48,6 +50,22 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Every fuzz target in turn; writes docs/hardening/fuzz.md. Needs a nightly toolchain and cargo-fuzz
+    Fuzz {
+        /// How long each target is fuzzed
+        seconds: u64,
+        /// This target alone; writes no page
+        #[arg(long)]
+        only: Option<String>,
+    },
+    /// Plans random problems in f32 and f64 and judges the plans; writes docs/hardening/numbers.md
+    Numbers {
+        /// Problems
+        #[arg(default_value_t = 10_000)]
+        count: u64,
+    },
+    /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
+    Deny,
     /// The instructions of one plan, counted by valgrind, in all and by function
     Count {
         /// A published scenario
@@ -74,6 +92,9 @@ fn run(command: &Command) -> anyhow::Result<bool> {
     let steps = match command {
         Command::Bench { arguments } => vec![bench(arguments)],
         Command::Count { scenario } => return count::count(scenario, top),
+        Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
+        Command::Numbers { count } => vec![numbers(*count)],
+        Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test(),
         Command::Target => target(),
@@ -123,6 +144,11 @@ fn target() -> Vec<Step> {
 fn bench(arguments: &[String]) -> Step {
     let program = "run --release --package quietpath-tests --bin bench --";
     Step::cargo("measurements", [&[program.to_owned()], arguments].concat().join(" ").trim_end())
+}
+
+fn numbers(count: u64) -> Step {
+    let program = "run --release --package quietpath-abuse --bin numbers --";
+    Step::cargo("random problems", &format!("{program} {count} --out docs/hardening/numbers.md"))
 }
 
 fn pictures() -> Vec<Step> {
