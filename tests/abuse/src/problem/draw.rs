@@ -1,5 +1,6 @@
 //! Draws problems.
 
+use quietpath_core::math::norm;
 use quietpath_core::scenario::{
     Agent, AgentSet, BeamPattern, Betrayal, Detection, Domain, Dropout, Jammer, Knot, Limit, Motion, Polygon,
     Pooling, Ranging, Reduce, ReferencePoint, Region, Sense, Sensor, Shape, Side, Sighting, Susceptibility, Term,
@@ -63,8 +64,8 @@ impl<T: Real, const DIM: usize> Problem<T, DIM> {
         let count = 1 + usize::from(dice.one_in(4)) + usize::from(dice.one_in(60));
         let agents: Vec<_> = (0..count).map(|_| agent(dice)).collect();
         let allowed = dice.of(&[1.5, 1.0, 1.001, 1.1, 2.0, 4.0, 0.9]).unwrap_or(1.5);
-        let fastest = |agent: &Agent<T, DIM>| ((agent.goal - agent.start) / agent.speed_max).norm_squared();
-        let shortest = agents.iter().map(|agent| fastest(agent).to_f64().sqrt()).fold(0.0, f64::max);
+        let fastest = |agent: &Agent<T, DIM>| (norm(&(agent.goal - agent.start)) / agent.speed_max).to_f64();
+        let shortest = agents.iter().map(fastest).fold(0.0, f64::max);
         let shortest = if shortest > 0.0 { shortest } else { 10.0 };
         let max = start_time + T::real(shortest * allowed);
         let stations: Vec<_> = {
