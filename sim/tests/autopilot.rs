@@ -139,7 +139,11 @@ fn nothing_but_heartbeats_until_it_is_asked_for_and_ardupilots_first_one_has_no_
         bench.pass(5.0);
         bench.heard.clear();
         bench.pass(2.0);
-        assert_eq!(bench.heard(|message| matches!(message, MavMessage::GLOBAL_POSITION_INT(_))), 0, "a restart forgets");
+        assert_eq!(
+            bench.heard(|message| matches!(message, MavMessage::GLOBAL_POSITION_INT(_))),
+            0,
+            "a restart forgets"
+        );
     }
 }
 
@@ -207,11 +211,21 @@ fn commands_have_the_answers_of_their_kind() {
         let one = bench.command(1, servo, [9.0, 1500.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let other = bench.command(1, actuator, [nan, 0.5, nan, nan, nan, nan, 0.0]);
         assert_eq!([one, other], expected, "{kind:?}");
-        assert_eq!((bench.machine.output(9), bench.machine.output(2)), if is_px4 { (None, Some(0.5)) } else { (Some(1500.0), None) });
+        assert_eq!(
+            (bench.machine.output(9), bench.machine.output(2)),
+            if is_px4 { (None, Some(0.5)) } else { (Some(1500.0), None) }
+        );
         let reposition = bench.command(1, MavCmd::MAV_CMD_DO_REPOSITION, [0.0, 0.0, 0.0, 0.0, 47.4, 8.5, 430.0]);
         assert_eq!(reposition, if is_px4 { accepted } else { MavResult::MAV_RESULT_COMMAND_INT_ONLY });
         let int = |command, frame| {
-            MavMessage::COMMAND_INT(COMMAND_INT_DATA { command, frame, target_system: 1, target_component: 1, param1: 2.0, ..Default::default() })
+            MavMessage::COMMAND_INT(COMMAND_INT_DATA {
+                command,
+                frame,
+                target_system: 1,
+                target_component: 1,
+                param1: 2.0,
+                ..Default::default()
+            })
         };
         let terrain = int(MavCmd::MAV_CMD_NAV_LAND, MavFrame::MAV_FRAME_GLOBAL_TERRAIN_ALT);
         assert_eq!(bench.ask(terrain), MavResult::MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME);
@@ -242,7 +256,8 @@ fn a_mission_is_flown_item_by_item_and_its_outputs_set_on_the_way() {
             Autopilot::ArduPilot => (MavCmd::MAV_CMD_DO_SET_SERVO, [1.0, 0.5, 0.0, 0.0]),
         };
         let output = Item { command, params, ..take_off };
-        let mut items = vec![take_off, waypoint(0.0, 20.0), speed, waypoint(60.0, 20.0), output, waypoint(100.0, 20.0)];
+        let mut items =
+            vec![take_off, waypoint(0.0, 20.0), speed, waypoint(60.0, 20.0), output, waypoint(100.0, 20.0)];
         if kind == Autopilot::ArduPilot {
             items.insert(0, stay(&HOME, 0.0));
         }
@@ -257,7 +272,8 @@ fn a_mission_is_flown_item_by_item_and_its_outputs_set_on_the_way() {
         let at = bench.machine.body().position;
         assert!((at[1] - 100.0).abs() < 1.5 && (at[2] - 20.0).abs() < 1.0, "{kind:?}: {at:?}");
         assert_eq!((bench.machine.output(1), bench.machine.is_mission_done()), (Some(0.5), true));
-        let reached = |message: &MavMessage| matches!(message, MavMessage::MISSION_ITEM_REACHED(data) if data.seq == last);
+        let reached =
+            |message: &MavMessage| matches!(message, MavMessage::MISSION_ITEM_REACHED(data) if data.seq == last);
         assert_eq!(bench.heard(reached), 1);
     }
 }
@@ -280,12 +296,11 @@ fn a_replaced_mission_leaves_the_running_item_and_goes_on_as_each_kind_does() {
         bench.machine.storage_mut().lists[0] = [0.0, 20.0, 60.0, 61.0].map(|north| waypoint(north, 20.0)).to_vec();
         assert!(bench.machine.change_mode(Mode::Mission) && bench.machine.set_current(2));
         bench.pass(4.0);
-        let to_station = |message: &MavMessage| {
-            matches!(message, MavMessage::MISSION_ACK(data) if data.target_system == STATION.system)
-        };
+        let to_station = |message: &MavMessage| matches!(message, MavMessage::MISSION_ACK(data) if data.target_system == STATION.system);
         assert_eq!(bench.heard(to_station), 1, "overheard");
         let mut highest = 0.0_f64;
-        while bench.heard(|message| matches!(message, MavMessage::MISSION_ITEM_REACHED(_))) < 2 && bench.now < 90_000 {
+        while bench.heard(|message| matches!(message, MavMessage::MISSION_ITEM_REACHED(_))) < 2 && bench.now < 90_000
+        {
             bench.pass(0.1);
             highest = highest.max(bench.machine.body().position[1]);
         }
@@ -300,7 +315,12 @@ fn payloads_answer_for_themselves_and_fall_silent() {
     let mut bench = Bench::new(Settings { payloads: vec![jammer], ..Settings::new(Autopilot::Px4, HOME) });
     let user = MavCmd::MAV_CMD_USER_2;
     assert_eq!(bench.command(26, user, [0.0, 0.7, 90.0, 0.0, 1.0, 0.0, 0.0]), MavResult::MAV_RESULT_ACCEPTED);
-    assert!(bench.heard.iter().any(|(_, component, message)| *component == 26 && matches!(message, MavMessage::COMMAND_ACK(_))));
+    assert!(
+        bench
+            .heard
+            .iter()
+            .any(|(_, component, message)| *component == 26 && matches!(message, MavMessage::COMMAND_ACK(_)))
+    );
     assert_eq!(bench.machine.payload(26).expect("on board").level(), 0.7);
     assert_eq!(bench.command(1, user, [0.0; 7]), MavResult::MAV_RESULT_UNSUPPORTED, "not the autopilot's");
     bench.pass(1.1);
@@ -311,20 +331,19 @@ fn payloads_answer_for_themselves_and_fall_silent() {
 fn silence_and_restarts_pass_and_the_flight_goes_on() {
     let at = Time::from_millis;
     for kind in KINDS {
-        let troubles = vec![
-            Trouble::Silence { from: at(30_000), until: at(34_000) },
-            Trouble::Restart { at: at(40_000) },
-        ];
+        let troubles =
+            vec![Trouble::Silence { from: at(30_000), until: at(34_000) }, Trouble::Restart { at: at(40_000) }];
         let settings = Settings { pilot: Pilot::TakesOff(20.0), troubles, ..Settings::new(kind, HOME) };
         let mut bench = Bench::new(settings);
         bench.pass(60.0);
-        let gaps: Vec<u64> = (bench.heard.iter().filter(|(_, _, message)| matches!(message, MavMessage::HEARTBEAT(_))))
-            .map(|(at, _, _)| *at)
-            .collect::<Vec<_>>()
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .filter(|gap| *gap > 1100)
-            .collect();
+        let gaps: Vec<u64> =
+            (bench.heard.iter().filter(|(_, _, message)| matches!(message, MavMessage::HEARTBEAT(_))))
+                .map(|(at, _, _)| *at)
+                .collect::<Vec<_>>()
+                .windows(2)
+                .map(|pair| pair[1] - pair[0])
+                .filter(|gap| *gap > 1100)
+                .collect();
         assert_eq!(gaps.len(), 2, "{gaps:?}");
         assert!(gaps[0] >= 4000 && (1500..3000).contains(&gaps[1]), "{gaps:?}");
         assert_eq!((bench.machine.landed(), bench.machine.is_armed()), (Landed::Air, true));

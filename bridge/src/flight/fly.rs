@@ -1,9 +1,11 @@
 //! The flight itself: along the plan, to the next plan, and out of it.
 
 use crate::command::Command;
+use crate::file::PlanFile;
+use crate::file::plan::AgentPlan;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
-use crate::replan::job::{Rejected, judge, rest};
+use crate::replan::job::{Rejected, judge, rest, step_value};
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -12,8 +14,10 @@ use super::{End, Flight, Flying, Level, Output, Phase};
 
 /// Time after the last node in which a steered vehicle settles, s.
 const SETTLE: f64 = 2.0;
-/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
-const BEHIND: usize = 2;
+/// How long a steered vehicle may take to the goal after its time, s.
+const ARRIVE_MAX: f64 = 30.0;
+/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off.
+const BEHIND: usize = 1;
 
 impl Flight {
     pub(super) fn fly(&mut self, vehicle: &Vehicle) {
@@ -42,8 +46,13 @@ impl Flight {
             FlyMode::Guided => {
                 let sample = self.flying.curve.sample(time);
                 self.steer(vehicle, &sample, Steering::Along);
-                if time > self.flying.curve.end() + SETTLE {
+                let late = time - self.flying.curve.end();
+                let is_there = self.distance_m(vehicle, &sample.position) < self.settings.arrival_m;
+                if late > SETTLE && is_there {
                     return self.leave(Mode::Hold, End::Done);
+                }
+                if late > ARRIVE_MAX {
+                    return self.give_up("the vehicle did not come to the goal".into());
                 }
             }
             FlyMode::Mission => {
@@ -111,11 +120,40 @@ impl Flight {
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
         };
         mission.items.drain(..BEHIND.min(mission.items.len()));
-        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 1);
+        self.carry_over(&mut next.plan);
+        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 0);
         next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
         self.next = Some(next);
+    }
+
+    /// Until the first node of a new plan the old one goes on: its controls there are those of the new plan's node 0,
+    /// which no integral counts.
+    fn carry_over(&self, plan: &mut PlanFile) {
+        let time = plan.start_time;
+        let times = self.flying.plan.node_times();
+        let same = |agent: &&AgentPlan| agent.name == self.agent;
+        let Some(old) = self.flying.plan.agents.iter().find(same) else { return };
+        let Some(new) = plan.agents.iter_mut().find(|agent| agent.name == self.agent) else { return };
+        for (new, old) in
+            [(&mut new.jam, &old.jam), (&mut new.dropout, &old.dropout), (&mut new.azimuth, &old.azimuth)]
+        {
+            if let (Some(first), Some(old)) = (new.as_mut().and_then(|new| new.first_mut()), old) {
+                *first = step_value(&times, old, time);
+            }
+        }
+    }
+
+    /// The item of a new mission to go on at: its first, or the one behind it where that node was passed in the meantime.
+    fn first_item(&self, vehicle: &Vehicle, next: &Flying) -> u16 {
+        // Item 0 of ArduPilot is home.
+        let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
+        if self.mission_time() <= next.curve.begin() {
+            return first;
+        }
+        let item = next.nodes.iter().position(|node| *node > 0).unwrap_or_default();
+        u16::try_from(item).unwrap_or(first)
     }
 
     fn advance_update(&mut self, vehicle: &Vehicle) {
@@ -129,12 +167,12 @@ impl Flight {
             Some(Ok(delivered)) => {
                 let kept = update.items().to_vec();
                 self.watch_over(Watch::new(self.talk(vehicle.identity, List::Mission), delivered), kept);
-                // Autopilots disagree on what they keep: the item is always said. Item 0 of ArduPilot is home.
-                let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
-                self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
                 if let Some(next) = self.next.take() {
+                    // Autopilots disagree on what they keep: the item is always said.
+                    let first = self.first_item(&vehicle, &next);
+                    self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
                     self.flying = next;
-                    self.item = Some((first, self.now));
+                    (self.item, self.expected) = (Some((first, self.now)), Some((first, self.now)));
                 }
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
             }

@@ -54,6 +54,8 @@ pub use settings::{FlyMode, OnFailure, Settings};
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Time between two requests of the same mode.
 const MODE_AGAIN: Duration = Duration::from_secs(1);
+/// How old a position may be before it is asked for again.
+const FIX_MAX: Duration = Duration::from_secs(2);
 /// Longest that leaving takes.
 const LEAVE_MAX: Duration = Duration::from_secs(3);
 
@@ -167,11 +169,16 @@ pub struct Flight {
     zero: Option<Time>,
     /// In mission mode: the item that is flown to, and since when.
     item: Option<(u16, Time)>,
+    /// An item that the vehicle was told to go on at, and when.
+    expected: Option<(u16, Time)>,
+    /// An item before the one that is flown to, said once.
+    doubt: Option<u16>,
     job: Option<(Box<Job>, Time)>,
     jobs: u64,
     heartbeat: Option<Time>,
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
+    intervals_asked: Time,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -232,11 +239,14 @@ impl Flight {
             update: None,
             zero: None,
             item: None,
+            expected: None,
+            doubt: None,
             job: None,
             jobs: 0,
             heartbeat: None,
             setpoint: None,
             mode_asked: None,
+            intervals_asked: Time::ZERO,
             link_lost: false,
             out: Vec::new(),
         })
@@ -327,9 +337,7 @@ impl Flight {
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);
-            for (message, hertz) in INTERVALS {
-                self.commands.submit(self.now, vehicle.identity, Command::interval(message, hertz));
-            }
+            self.ask_for_intervals(vehicle.identity);
         }
         let mut out = Vec::new();
         if let MavMessage::TIMESYNC(data) = &frame.message
@@ -392,6 +400,23 @@ impl Flight {
         self.out.push(Output::End(end));
     }
 
+    fn ask_for_intervals(&mut self, vehicle: Identity) {
+        self.intervals_asked = self.now;
+        for (message, hertz) in INTERVALS {
+            self.commands.submit(self.now, vehicle, Command::interval(message, hertz));
+        }
+    }
+
+    /// A vehicle that is heard and does not say where it is has begun anew, or never heard the question.
+    fn ask_again_for_intervals(&mut self, vehicle: &Vehicle) {
+        let is_stale = vehicle.fix.is_none_or(|fix| self.now.since(fix.heard) > FIX_MAX);
+        let is_due = self.now.since(self.intervals_asked) > FIX_MAX;
+        if is_stale && is_due && self.now.since(vehicle.heard) < FIX_MAX && self.commands.under_way() == 0 {
+            self.say(Level::Warn, "the vehicle does not say where it is: asking again");
+            self.ask_for_intervals(vehicle.identity);
+        }
+    }
+
     /// Asks for a mode, again and again until the vehicle has it.
     fn ask_for(&mut self, vehicle: &Vehicle, mode: Mode) {
         if vehicle.mode == mode || self.mode_asked.is_some_and(|asked| self.now.since(asked) < MODE_AGAIN) {
@@ -421,6 +446,7 @@ impl Flight {
         }
         let mut out = Vec::new();
         self.timesync.poll(self.now, vehicle.identity, &mut out);
+        self.ask_again_for_intervals(&vehicle);
         let unanswered = self.commands.poll(self.now, self.round_trip, &mut out);
         self.send(out);
         for ended in unanswered {

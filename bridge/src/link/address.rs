@@ -115,7 +115,9 @@ mod tests {
 
     #[test]
     fn addresses_read_and_print_the_same() {
-        for text in ["serial:/dev/ttyACM0:921600", "udpin:0.0.0.0:14550", "udpout:[::1]:14540", "tcpin:h:1", "pty:/tmp/a"] {
+        for text in
+            ["serial:/dev/ttyACM0:921600", "udpin:0.0.0.0:14550", "udpout:[::1]:14540", "tcpin:h:1", "pty:/tmp/a"]
+        {
             assert_eq!(text.parse::<Address>().expect(text).to_string(), text);
         }
         let by_path = "serial:/dev/serial/by-path/usb-0:1.0-port".parse::<Address>().expect("colons in the path");

@@ -23,8 +23,9 @@ use crate::frame::{Altitude, Place};
 use crate::link::dialect::{HEARTBEAT_DATA, MavAutopilot, MavLandedState, MavMessage, MavModeFlag, MavType};
 use crate::link::{Frame, Identity};
 
-/// Messages to ask for, and how often, Hz: GLOBAL_POSITION_INT, MISSION_CURRENT, EXTENDED_SYS_STATE.
-pub const INTERVALS: [(u32, f32); 3] = [(33, 10.0), (42, 2.0), (245, 2.0)];
+/// Messages to ask for, and how often, Hz: GLOBAL_POSITION_INT, MISSION_CURRENT, EXTENDED_SYS_STATE. Payloads are switched
+/// where the mission is, so where it is must be known to a tenth of a second.
+pub const INTERVALS: [(u32, f32); 3] = [(33, 10.0), (42, 20.0), (245, 2.0)];
 
 /// Silence after which the link to the autopilot counts as lost.
 pub const LINK_TIMEOUT: Duration = Duration::from_secs(3);

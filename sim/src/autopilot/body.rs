@@ -156,11 +156,13 @@ impl Body {
 
     /// The velocity along a leg, with what is needed to get back onto it.
     fn along_leg(&self, from: Vector, to: Vector, speed: f64, stops: Stops, limits: &Limits) -> Vector {
+        let speed = speed.min(limits.speed_max.hypot(limits.climb_max));
         let rest = subtract(to, self.position);
         let line = subtract(to, from);
         let length = norm(line);
         // A leg without length is a place to be at.
-        let direction = if length > 1e-6 { scale(line, 1.0 / length) } else { scale(rest, 1.0 / norm(rest).max(1e-6)) };
+        let direction =
+            if length > 1e-6 { scale(line, 1.0 / length) } else { scale(rest, 1.0 / norm(rest).max(1e-6)) };
         let along = dot(rest, direction);
         let aside = subtract(rest, scale(direction, along));
         let along = match stops {

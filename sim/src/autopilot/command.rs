@@ -94,7 +94,9 @@ impl Machine {
         }
         let [p1, p2, p3, _] = asked.params;
         match asked.command {
-            MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => yes(p1 >= 0.0 && self.streams.set(p1 as u32, p2), R::MAV_RESULT_FAILED),
+            MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => {
+                yes(p1 >= 0.0 && self.streams.set(p1 as u32, p2), R::MAV_RESULT_FAILED)
+            }
             MavCmd::MAV_CMD_REQUEST_MESSAGE => yes(self.say_once(p1 as u32), R::MAV_RESULT_UNSUPPORTED),
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM if p1 >= 0.5 => {
                 self.arm();

@@ -128,9 +128,7 @@ impl Guided {
             Target::Along { position, velocity, acceleration } => {
                 // Between two setpoints the autopilot goes on as the last one said.
                 let ahead = self.heard.map_or(0.0, |heard| now.since(heard).as_secs_f64()).min(0.5);
-                let at = |axis: usize| {
-                    position[axis] + ahead * (velocity[axis] + 0.5 * ahead * acceleration[axis])
-                };
+                let at = |axis: usize| position[axis] + ahead * (velocity[axis] + 0.5 * ahead * acceleration[axis]);
                 let speed = |axis: usize| velocity[axis] + ahead * acceleration[axis];
                 let (position, velocity) = ([at(0), at(1), at(2)], [speed(0), speed(1), speed(2)]);
                 Aim::Along { position, velocity, acceleration }

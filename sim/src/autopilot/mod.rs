@@ -276,7 +276,9 @@ impl Machine {
         }
         match &frame.message {
             message @ (MavMessage::COMMAND_LONG(_) | MavMessage::COMMAND_INT(_)) => self.command(frame.from, message),
-            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data) if is_ours(data.target_system, data.target_component) => {
+            MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data)
+                if is_ours(data.target_system, data.target_component) =>
+            {
                 let (kind, home) = (self.settings.like, self.settings.home.altitude_m);
                 if let Taken::Kills(why) = self.guided.take(self.now, kind, &self.frame, home, data) {
                     self.killed = Some(why);

@@ -63,7 +63,9 @@ impl Params {
     /// Takes a message.
     pub(super) fn handle(&mut self, message: &MavMessage, out: &mut Vec<MavMessage>) {
         match message {
-            MavMessage::PARAM_REQUEST_LIST(_) => out.extend((0..self.list.len()).filter_map(|index| self.value(index))),
+            MavMessage::PARAM_REQUEST_LIST(_) => {
+                out.extend((0..self.list.len()).filter_map(|index| self.value(index)))
+            }
             MavMessage::PARAM_REQUEST_READ(data) => {
                 let index = match usize::try_from(data.param_index) {
                     Ok(index) => Some(index),

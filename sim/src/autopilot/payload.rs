@@ -157,7 +157,14 @@ mod tests {
 
     fn jam(level: f32, instance: f32, life: f32) -> COMMAND_LONG_DATA {
         let command = MavCmd::MAV_CMD_USER_2;
-        COMMAND_LONG_DATA { param1: instance, param2: level, param3: 90.0, param5: life, command, ..Default::default() }
+        COMMAND_LONG_DATA {
+            param1: instance,
+            param2: level,
+            param3: 90.0,
+            param5: life,
+            command,
+            ..Default::default()
+        }
     }
 
     #[test]
@@ -175,7 +182,10 @@ mod tests {
             (jam(f32::NAN, 2.0, 1.0), MavResult::MAV_RESULT_DENIED),
             (jam(0.5, 0.0, 1.0), MavResult::MAV_RESULT_DENIED),
             (jam(0.5, 2.0, 3600.0), MavResult::MAV_RESULT_DENIED),
-            (COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..jam(0.5, 2.0, 1.0) }, MavResult::MAV_RESULT_UNSUPPORTED),
+            (
+                COMMAND_LONG_DATA { command: MavCmd::MAV_CMD_USER_1, ..jam(0.5, 2.0, 1.0) },
+                MavResult::MAV_RESULT_UNSUPPORTED,
+            ),
         ] {
             assert_eq!((jammer.command(at(2000), &wrong), jammer.level()), (result, 0.0), "{wrong:?}");
         }

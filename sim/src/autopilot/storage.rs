@@ -153,7 +153,11 @@ impl Storage {
     }
 
     fn clear(&mut self, from: Identity, list: MavMissionType, out: &mut Vec<MavMessage>) -> bool {
-        let lists = if list == MavMissionType::MAV_MISSION_TYPE_ALL { vec![0, 1, 2] } else { index(list).into_iter().collect() };
+        let lists = if list == MavMissionType::MAV_MISSION_TYPE_ALL {
+            vec![0, 1, 2]
+        } else {
+            index(list).into_iter().collect()
+        };
         for list in &lists {
             self.lists[*list].clear();
             self.renumber(*list);
@@ -191,7 +195,8 @@ impl Storage {
             receiving.list == list && receiving.count == count && receiving.items.is_empty()
         });
         if !is_again {
-            self.receiving = Some(Receiving { partner: from, list, count, items: Vec::new(), heard: now, asked: now });
+            self.receiving =
+                Some(Receiving { partner: from, list, count, items: Vec::new(), heard: now, asked: now });
         }
         self.ask(now, out);
         false
@@ -299,7 +304,9 @@ const fn address(message: &MavMessage) -> Option<(u8, u8, MavMissionType)> {
         MavMessage::MISSION_COUNT(data) => Some((data.target_system, data.target_component, data.mission_type)),
         MavMessage::MISSION_ITEM_INT(data) => Some((data.target_system, data.target_component, data.mission_type)),
         MavMessage::MISSION_CLEAR_ALL(data) => Some((data.target_system, data.target_component, data.mission_type)),
-        MavMessage::MISSION_REQUEST_LIST(data) => Some((data.target_system, data.target_component, data.mission_type)),
+        MavMessage::MISSION_REQUEST_LIST(data) => {
+            Some((data.target_system, data.target_component, data.mission_type))
+        }
         MavMessage::MISSION_REQUEST_INT(data) => Some((data.target_system, data.target_component, data.mission_type)),
         MavMessage::MISSION_ACK(data) => Some((data.target_system, data.target_component, data.mission_type)),
         _ => None,

@@ -96,7 +96,9 @@ fn settings(args: &AutopilotArgs) -> Result<Settings, Failure> {
     settings.payloads.extend(args.jammer.iter().map(spec(Kind::Jammer)));
     let at = |seconds: Duration| Time::ZERO + seconds;
     settings.troubles.extend(args.restart_at.iter().map(|seconds| Trouble::Restart { at: at(*seconds) }));
-    settings.troubles.extend(args.silent.iter().map(|window| Trouble::Silence { from: at(window.0), until: at(window.1) }));
+    settings
+        .troubles
+        .extend(args.silent.iter().map(|window| Trouble::Silence { from: at(window.0), until: at(window.1) }));
     settings.troubles.extend(args.station_at.iter().map(|seconds| Trouble::Station {
         at: at(*seconds),
         items: vec![crate::autopilot::trouble::stay(&settings.home, height); 2],
@@ -123,7 +125,8 @@ fn tell(moment: &Moment<'_>, last: &mut String) -> Result<(), Failure> {
         (None, Some(why)) => format!("no link: {why}"),
         (None, None) => {
             let armed = if machine.is_armed() { "armed" } else { "disarmed" };
-            let item = if machine.mode() == Mode::Mission { format!(", item {}", machine.current()) } else { String::new() };
+            let item =
+                if machine.mode() == Mode::Mission { format!(", item {}", machine.current()) } else { String::new() };
             format!("{armed}, {:?}, mode {:?}{item}", machine.landed(), machine.mode())
         }
     };
@@ -145,7 +148,8 @@ impl Track {
     fn create(path: &Path) -> Result<Self, Failure> {
         let fail = |cause| Failure::write(path, &cause);
         let mut file = std::io::BufWriter::new(std::fs::File::create(path).map_err(fail)?);
-        writeln!(file, "time_s,latitude_deg,longitude_deg,altitude_m,east_m_s,north_m_s,up_m_s,mode,jam").map_err(fail)?;
+        writeln!(file, "time_s,latitude_deg,longitude_deg,altitude_m,east_m_s,north_m_s,up_m_s,mode,jam")
+            .map_err(fail)?;
         Ok(Self { path: path.to_owned(), file, due: Time::ZERO })
     }
 
