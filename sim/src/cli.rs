@@ -85,7 +85,7 @@ Exit status: 0 its time is over, 2 bad input.
 
 Example:
   quietpath autopilot --connect udpout:127.0.0.1:14540 --like px4 --scenario scenario.toml --pilot takeoff")]
-    Autopilot(AutopilotArgs),
+    Autopilot(Box<AutopilotArgs>),
     /// Print the completions of a shell
     #[command(after_help = "\
 Example:

@@ -4,15 +4,18 @@
 //! The scenario is wight-jam in a tenth of its space and a fiftieth of its time: 6 m/s over 1 km, as a small multicopter
 //! flies. Its planning problem is the same in other units.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use quietpath_bridge::file::plan::AgentPlan;
+use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::flight::settings::{PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{self, End, FlyMode};
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::memory::Faults;
-use quietpath_bridge::planning::{Options, assess, plan};
+use quietpath_bridge::link::dialect::MavCmd;
+use quietpath_bridge::mission::{Item, List};
+use quietpath_bridge::planning::{Options, plan};
 use quietpath_bridge::replan::job::step_value;
 use quietpath_bridge::telemetry::Autopilot;
 use quietpath_sim::autopilot::payload::{Kind, Spec};
@@ -54,9 +57,12 @@ fn swift() -> ScenarioFile {
 struct Flown {
     /// Scenario time, position, jamming level of the payload, at every step of the clock.
     track: Vec<(f64, Vec<f64>, f32)>,
-    /// The plans that flew, each from its own begin on.
+    /// The plans that were made.
     plans: Vec<PlanFile>,
-    /// In mission mode: scenario time at which the vehicle began to fly to a node.
+    /// By the bits of the time: what the jammer is meant to do, by the plan and where the vehicle is in it.
+    wanted: BTreeMap<u64, f32>,
+    /// The clock's time at the scenario's zero, s.
+    began: f64,
     said: Vec<String>,
     end: Option<End>,
 }
@@ -67,11 +73,13 @@ fn setup(truth: &ScenarioFile, first: &PlanFile, kind: Autopilot, mode: FlyMode)
         FlyMode::Guided => Pilot::TakesOff(vehicle.start_height(truth, None).expect("a start")),
         FlyMode::Mission => Pilot::StartsMission,
     };
+    // Nothing to catch up with: a vehicle that is no faster than its plans keeps their bound.
+    vehicle.limits.speed_max = truth.agents[0].speed_max * truth.frame.unit_m;
     vehicle.payloads = vec![Spec { kind: Kind::Jammer, component: JAMMER, instance: 0 }];
     let jammer = PayloadEntry { kind: PayloadKind::Jammer, component: JAMMER, instance: 0, mission_output: None };
     // 18 steps of five intervals.
     let interval_s = truth.time.max / 18.0;
-    let replan = Replanning { interval_s, lead_s: 3.0, deadline_s: 2.0, time_to_live_s: 60.0, sigma_max: 10.0 };
+    let replan = Replanning { interval_s, lead_s: 3.0, deadline_s: 2.0, time_to_live_s: 60.0, ..Replanning::default() };
     let settings = flight::Settings {
         mode,
         replan: Some(replan),
@@ -83,18 +91,64 @@ fn setup(truth: &ScenarioFile, first: &PlanFile, kind: Autopilot, mode: FlyMode)
     Setup { hop: Hop::loopback().expect("sockets"), ..Setup::new(known, first.clone(), settings, vehicle) }
 }
 
+/// What the jammer is meant to do: the plan that flies, at the scenario's time where it is steered, and on the way to the
+/// node that the vehicle flies to where it flies a mission.
+struct Schedule {
+    plan: PlanFile,
+    next: Option<PlanFile>,
+    /// The node that the vehicle flies to, where that is known.
+    node: usize,
+}
+
+impl Schedule {
+    fn new(plan: &PlanFile) -> Self {
+        Self { plan: plan.clone(), next: None, node: 0 }
+    }
+
+    fn takes_over(&mut self) {
+        if let Some(next) = self.next.take() {
+            (self.plan, self.node) = (next, 0);
+        }
+    }
+
+    fn wanted(&mut self, time: f64, item: Option<(&[Item], u16)>) -> f32 {
+        let agent = self.plan.agents.first().expect("an agent");
+        let jam = agent.jam.as_deref().unwrap_or_default();
+        let times = self.plan.node_times();
+        let Some((items, current)) = item else {
+            let is_over = times.last().is_some_and(|last| time > *last);
+            return if is_over { 0.0 } else { step_value(&times, jam, time) as f32 };
+        };
+        // The list in the vehicle is that of the plan that flies when its length fits; its last waypoint is the last node.
+        let is_waypoint = |item: &&Item| item.command == MavCmd::MAV_CMD_NAV_WAYPOINT;
+        let ahead = items.iter().skip(usize::from(current)).filter(is_waypoint).count();
+        if self.next.is_none() && ahead > 0 {
+            self.node = self.node.max(times.len().saturating_sub(ahead));
+        }
+        jam.get(self.node).copied().unwrap_or_default() as f32
+    }
+}
+
 fn fly(truth: &ScenarioFile, setup: Setup) -> Flown {
+    let mode = setup.flight.mode;
     let frame = LocalFrame::of(truth).expect("it lies on the Earth");
     let mut flown = Flown { plans: vec![setup.plan.clone()], ..Flown::default() };
     let mut flight = Rehearsal::new(setup).expect("a flight");
     let mut reported = f64::NEG_INFINITY;
+    let mut schedule = Schedule::new(&flown.plans[0]);
     while flight.end().is_none() {
         for event in flight.step().expect("loopback carries") {
             match event {
-                Event::Said(_, text) => flown.said.push(format!("{:.2} {text}", flight.now().seconds())),
+                Event::Said(_, text) => {
+                    if text.contains("was replaced") || (text.starts_with("the plan of") && text.ends_with("flies")) {
+                        schedule.takes_over();
+                    }
+                    flown.said.push(format!("{:.2} {text}", flight.now().seconds()));
+                }
                 Event::Planned(answer) => {
                     let (plan, feasible) = answer.result.expect("a plan");
                     assert!(feasible, "plan {}", answer.number);
+                    schedule.next = Some(plan.clone());
                     flown.plans.push(plan);
                 }
                 Event::Ended(_) => {}
@@ -109,50 +163,142 @@ fn fly(truth: &ScenarioFile, setup: Setup) -> Flown {
         }
         let position = frame.position(&flight.machine().place()).expect("a position");
         let level = flight.machine().payload(JAMMER).expect("on board").level();
+        flown.began = flight.now().seconds() - time;
+        let item = (mode == FlyMode::Mission).then(|| (flight.machine().list(List::Mission), flight.machine().current()));
+        flown.wanted.insert(time.to_bits(), schedule.wanted(time, item));
         flown.track.push((time, position, level));
     }
     flown.end = flight.end().cloned();
     flown
 }
 
-/// The plan that is meant to fly at a time: the last one that has begun.
-fn plan_at(flown: &Flown, time: f64) -> &PlanFile {
-    flown.plans.iter().rev().find(|plan| plan.start_time <= time).unwrap_or(&flown.plans[0])
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-fn agent(plan: &PlanFile) -> &AgentPlan {
-    plan.agents.first().expect("an agent")
+/// How the flown track keeps the scenario's constraints, each as a share of its own bound.
+struct Kept {
+    /// Largest speed over one interval, over its bound.
+    speed: f64,
+    /// Largest change of velocity from one interval to the next, over its bound.
+    accel: f64,
+    /// Least distance from the centre of a region, over its radius.
+    region: f64,
+    /// Furthest out of the domain, length units; negative inside.
+    domain: f64,
+    /// Jamming sent, over its budget.
+    jamming: f64,
+    /// Distance from the goal at the end, m.
+    goal_m: f64,
+}
+
+fn kept(truth: &ScenarioFile, flown: &Flown) -> Kept {
+    use quietpath_bridge::file::scenario::Outline;
+    let limits = &truth.agents[0];
+    let (begin, end) = (flown.track[0].0, flown.plans[0].duration);
+    let interval = flown.plans[0].duration / truth.intervals as f64;
+    let nodes: Vec<&Vec<f64>> = (0..)
+        .map(|node| begin + interval * f64::from(node))
+        .take_while(|time| *time <= flown.track[flown.track.len() - 1].0)
+        .map(|time| &flown.track[flown.track.partition_point(|(at, ..)| *at < time).min(flown.track.len() - 1)].1)
+        .collect();
+    let speeds = nodes.windows(2).map(|pair| distance(pair[0], pair[1]) / (interval * limits.speed_max));
+    let bends = nodes.windows(3).map(|three| {
+        let middle: Vec<f64> = three[0].iter().zip(three[2]).map(|(a, b)| 0.5 * (a + b)).collect();
+        2.0 * distance(&middle, three[1]) / (interval * interval * limits.accel_max)
+    });
+    let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::NEG_INFINITY, f64::max);
+    let mut region = f64::INFINITY;
+    for entry in &truth.regions {
+        let Outline::Circle { center, radius } = &entry.outline else { panic!("a circle") };
+        region = flown.track.iter().map(|(_, at, _)| distance(at, center) / radius).fold(region, f64::min);
+    }
+    let outside = |at: &Vec<f64>| {
+        let axis = |axis: usize| (truth.domain.min[axis] - at[axis]).max(at[axis] - truth.domain.max[axis]);
+        axis(0).max(axis(1))
+    };
+    let jammed: f64 =
+        flown.track.windows(2).map(|pair| (pair[1].0 - pair[0].0) * f64::from(pair[1].2)).sum();
+    let last = &flown.track[flown.track.len() - 1].1;
+    println!("  the first plan ends at {end:.1} s, the flight at {:.1} s", flown.track[flown.track.len() - 1].0);
+    Kept {
+        speed: largest(&mut speeds.into_iter()),
+        accel: largest(&mut bends.into_iter()),
+        region,
+        domain: largest(&mut flown.track.iter().map(|(_, at, _)| outside(at))),
+        jamming: jammed / limits.jammer.expect("a jammer").budget,
+        goal_m: distance(last, &limits.goal) * truth.frame.unit_m,
+    }
+}
+
+/// Longest time for which the jammer does something else than the plan, s, up to the plan's end. `skips` are windows in
+/// which nobody can know.
+fn lateness(flown: &Flown, skips: &[(f64, f64)]) -> f64 {
+    let (mut streak, mut longest, mut before) = (0.0_f64, 0.0_f64, 0.0);
+    for (time, _, level) in &flown.track {
+        let wanted = flown.wanted.get(&time.to_bits()).copied().unwrap_or_default();
+        let is_skipped = skips.iter().any(|(from, until)| (*from..*until).contains(time));
+        streak = if (wanted - level).abs() > 1e-3 && !is_skipped { streak + time - before } else { 0.0 };
+        longest = longest.max(streak);
+        before = *time;
+    }
+    longest
+}
+
+/// One flight with everything that it must show.
+fn check(kind: Autopilot, mode: FlyMode, faults: Faults, restart: Option<f64>) {
+    let truth = swift();
+    let known = rehearsal::revealed(&truth, truth.start_time);
+    let first = plan(&known, &Options::default()).expect("a plan").plan;
+    let mut setup = setup(&truth, &first, kind, mode);
+    (setup.faults, setup.seed) = (faults, 7);
+    setup.autopilot.troubles.extend(restart.map(|at| Trouble::Restart { at: Time::ZERO + Duration::from_secs_f64(at) }));
+    let flown = fly(&truth, setup);
+    assert_eq!(flown.end, Some(End::Done), "{:#?}", flown.said);
+    assert!(flown.plans.len() >= 12, "planned anew {} times: {:#?}", flown.plans.len() - 1, flown.said);
+    let kept = kept(&truth, &flown);
+    // From the clock's time to the scenario's: the flight began when the plan did.
+    let skips: Vec<(f64, f64)> = restart.map(|at| (at - flown.began, at - flown.began + 4.0)).into_iter().collect();
+    let late = lateness(&flown, &skips);
+    println!(
+        "{kind:?} {mode:?} loss {}: speed {:.4} accel {:.3} region {:.4} domain {:.3} jamming {:.3} goal {:.2} m, late {:.0} ms",
+        faults.loss, kept.speed, kept.accel, kept.region, kept.domain, kept.jamming, kept.goal_m, late * 1e3
+    );
+    let why = &flown.said;
+    // A hundredth of each bound is what a vehicle needs to follow; at the start it stands, and the plan does not.
+    assert!(kept.speed < 1.01 && kept.accel < 1.01, "{why:#?}");
+    assert!(kept.region > 0.99 && kept.domain < 0.01, "{why:#?}");
+    assert!(kept.jamming < 1.02, "{why:#?}");
+    assert!(kept.goal_m < 3.0, "{why:#?}");
+    assert!(late <= 0.1 + 1e-9, "{late}: {why:#?}");
 }
 
 #[test]
-fn look() {
-    let truth = swift();
-    let known = rehearsal::revealed(&truth, 0.0);
-    let first = plan(&known, &Options::default()).expect("a plan");
-    println!("{:?} {:?}", first.status, first.plan.duration);
+fn px4_steered() {
+    check(Autopilot::Px4, FlyMode::Guided, Faults::NONE, None);
+}
+
+#[test]
+fn px4_by_missions() {
+    check(Autopilot::Px4, FlyMode::Mission, Faults::NONE, None);
+}
+
+#[test]
+fn ardupilot_steered() {
+    check(Autopilot::ArduPilot, FlyMode::Guided, Faults::NONE, None);
+}
+
+#[test]
+fn ardupilot_by_missions() {
+    check(Autopilot::ArduPilot, FlyMode::Mission, Faults::NONE, None);
+}
+
+/// A tenth is lost in each direction, and the autopilot begins anew in the middle.
+#[test]
+fn with_losses_and_a_restart() {
     for kind in [Autopilot::Px4, Autopilot::ArduPilot] {
         for mode in [FlyMode::Guided, FlyMode::Mission] {
-            let begin = std::time::Instant::now();
-            let flown = fly(&truth, setup(&truth, &first.plan, kind, mode));
-            println!("{kind:?} {mode:?} {:?} plans {} last {:?} {:?}", flown.end, flown.plans.len(), flown.track.last(), begin.elapsed());
-            println!("{:#?}", flown.said);
-            let mut worst = 0.0_f64;
-            let limits = &truth.agents[0];
-            for pair in flown.track.windows(2) {
-                let speed = pair[0].1.iter().zip(&pair[1].1).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / (pair[1].0 - pair[0].0);
-                worst = worst.max(speed / limits.speed_max);
-            }
-            println!("speed {worst}");
-            let mut off = 0;
-            let mut streak = 0.0_f64; let mut longest = 0.0_f64;
-            for (time, _, level) in &flown.track {
-                let plan = plan_at(&flown, *time);
-                let agent = agent(plan);
-                let expected = step_value(&plan.node_times(), agent.jam.as_deref().unwrap_or(&[0.0]), *time) as f32;
-                if (expected - level).abs() > 1e-3 { off += 1; streak += 0.01; longest = longest.max(streak); } else { streak = 0.0; }
-            }
-            println!("jam off {off} of {}, longest {longest}", flown.track.len());
+            check(kind, mode, Faults { loss: 0.1, ..Faults::NONE }, Some(120.0));
         }
     }
-    let _ = (Duration::ZERO, Faults::NONE, Trouble::Restart { at: quietpath_bridge::clock::Time::ZERO }, assess(&truth, &first.plan, "a").is_ok());
 }

@@ -5,7 +5,7 @@ use crate::file::PlanFile;
 use crate::file::plan::AgentPlan;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
-use crate::replan::job::{Rejected, judge, rest, step_value};
+use crate::replan::job::{Rejected, judge, rest, rest_at, step_value};
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -40,7 +40,9 @@ impl Flight {
         let time = self.scenario_time();
         if let Some(next) = self.next.take_if(|next| next.curve.begin() <= time) {
             self.say(Level::Info, format!("the plan of {:.1} s flies", next.curve.begin()));
-            self.flying = next;
+            // Its first setpoint does not wait for its turn.
+            self.setpoint = None;
+            self.take_over(next);
         }
         match self.settings.mode {
             FlyMode::Guided => {
@@ -81,11 +83,19 @@ impl Flight {
 
     fn plan_anew(&mut self, time: f64) {
         let Some(replan) = self.settings.replan else { return };
-        let is_busy = self.job.is_some() || self.next.is_some() || self.update.is_some();
-        if is_busy || time - self.flying.made < replan.interval_s {
+        if self.job.is_some() || self.next.is_some() || self.update.is_some() {
             return;
         }
-        let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, time + replan.lead_s) else {
+        let (world, plan) = (&self.world, &self.flying.plan);
+        let prompt = replan.prompt_lead_s.filter(|_| self.is_news && self.settings.mode == FlyMode::Guided);
+        let is_due = time - self.flying.made >= replan.interval_s;
+        let job = match prompt {
+            Some(lead) => rest_at(self.jobs + 1, world, plan, time + lead),
+            None if is_due => rest(self.jobs + 1, world, plan, time + replan.lead_s),
+            None => return,
+        };
+        self.is_news = false;
+        let Some(job) = job else {
             // Too little is left: the plan is good to its end.
             self.flying.made = time;
             return;
@@ -102,7 +112,8 @@ impl Flight {
             Err(Rejected::Stale) => self.job = Some((job, asked)),
             Err(why) => self.say(Level::Warn, format!("the plan for {:.1} s does not fly: {why}", job.seam)),
             Ok((plan, curve)) if matches!(self.phase, Phase::Fly) => {
-                let next = Flying { plan, curve, made: time, nodes: Vec::new() };
+                let budgets = job.scenario.agents.first().map(|agent| (agent.jammer, agent.dropout));
+                let next = Flying { plan, curve, made: time, nodes: Vec::new(), budgets };
                 match self.settings.mode {
                     FlyMode::Guided => self.next = Some(next),
                     FlyMode::Mission => self.begin_update(next),
@@ -110,6 +121,14 @@ impl Flight {
             }
             Ok(_) => {}
         }
+    }
+
+    /// A new plan flies. What is spent before it is spent: its budgets are those of the rest.
+    fn take_over(&mut self, next: Flying) {
+        if let (Some((jammer, dropout)), Some(agent)) = (next.budgets, self.world.agents.first_mut()) {
+            (agent.jammer, agent.dropout) = (jammer, dropout);
+        }
+        self.flying = next;
     }
 
     /// Sends the rest of the mission by a new plan.
@@ -169,9 +188,9 @@ impl Flight {
                 self.watch_over(Watch::new(self.talk(vehicle.identity, List::Mission), delivered), kept);
                 if let Some(next) = self.next.take() {
                     // Autopilots disagree on what they keep: the item is always said.
-                    let first = self.first_item(&vehicle, &next);
+                    let first = self.first_item(vehicle, &next);
                     self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
-                    self.flying = next;
+                    self.take_over(next);
                     (self.item, self.expected) = (Some((first, self.now)), Some((first, self.now)));
                 }
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));

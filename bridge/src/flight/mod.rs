@@ -32,6 +32,7 @@ pub mod settings;
 
 use std::time::Duration;
 
+use quietpath_core::scenario::{Dropout, Jammer};
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Time;
@@ -139,6 +140,8 @@ struct Flying {
     made: f64,
     /// For each item of the mission the node that it flies to; empty where the bridge steers.
     nodes: Vec<usize>,
+    /// Jammer and dropout with what is left of their budgets where the plan begins; the scenario's own where not given.
+    budgets: Option<(Option<Jammer<f64>>, Option<Dropout<f64>>)>,
 }
 
 /// A flight. See the [module](self).
@@ -175,6 +178,8 @@ pub struct Flight {
     doubt: Option<u16>,
     job: Option<(Box<Job>, Time)>,
     jobs: u64,
+    /// An observation came that no plan knows of.
+    is_news: bool,
     heartbeat: Option<Time>,
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
@@ -234,7 +239,7 @@ impl Flight {
             kept: Vec::new(),
             check: None,
             phase: Phase::Connect,
-            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new() },
+            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None },
             next: None,
             update: None,
             zero: None,
@@ -243,6 +248,7 @@ impl Flight {
             doubt: None,
             job: None,
             jobs: 0,
+            is_news: false,
             heartbeat: None,
             setpoint: None,
             mode_asked: None,
@@ -374,8 +380,9 @@ impl Flight {
     fn observe(&mut self, observation: &Observation) {
         let sigma_max = self.settings.replan.map_or(f64::MAX, |replan| replan.sigma_max);
         let now = self.scenario_time();
-        if let Err(why) = observation.apply(&mut self.world, now, sigma_max) {
-            self.say(Level::Warn, format!("an observation of {why}"));
+        match observation.apply(&mut self.world, now, sigma_max) {
+            Ok(()) => self.is_news = true,
+            Err(why) => self.say(Level::Warn, format!("an observation of {why}")),
         }
     }
 

@@ -81,49 +81,96 @@ pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, earliest: f64)
     let first = times.iter().position(|time| *time >= earliest)?;
     let (seam, last) = (times.get(first).copied()?, times.last().copied()?);
     let intervals = times.len().checked_sub(first + 1)?;
-    if intervals < INTERVALS_MIN {
-        return None;
-    }
     let agent_plan = flying.agents.first()?;
     let curve = Curve::of(flying, &agent_plan.name)?;
-    let at = curve.sample(seam);
+    let interval = (last - seam) / intervals as f64;
+    // Nodes of unequal times are not those of a new plan: the curve between them is.
+    let sampled = || (0..=intervals).map(|node| curve.sample(seam + interval * node as f64).position).collect();
+    let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
+    let mut path: Vec<Vec<f64>> = if flying.times.is_some() { sampled() } else { nodes() };
+    path.first_mut()?.clone_from(agent_plan.path.get(first)?);
+    problem(number, world, flying, seam, path)
+}
+
+/// The rest of a flight from any time on: for a plan that cannot wait for a node. Its nodes are spread anew over the straight
+/// segments of the flying plan, no closer than they were, and so keep the bound on speed; where they break another
+/// constraint the planner begins from nothing.
+#[must_use]
+pub fn rest_at(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64) -> Option<Job> {
+    let times = flying.node_times();
+    let (begin, last) = (times.first().copied()?, times.last().copied()?);
+    let interval = (last - begin) / times.len().checked_sub(1)? as f64;
+    // Casts of floats saturate; what is beyond the end has no intervals.
+    let intervals = ((last - seam) / interval) as usize;
+    let agent_plan = flying.agents.first()?;
+    let curve = Curve::of(flying, &agent_plan.name)?;
+    let interval = (last - seam) / intervals as f64;
+    let at = |node: usize| straight(&times, &agent_plan.path, seam + interval * node as f64);
+    let mut path = (0..=intervals).map(at).collect::<Option<Vec<_>>>()?;
+    *path.first_mut()? = curve.sample(seam).position;
+    problem(number, world, flying, seam, path)
+}
+
+/// Where straight segments between nodes are at a time.
+fn straight(times: &[f64], path: &[Vec<f64>], time: f64) -> Option<Vec<f64>> {
+    let after = times.iter().position(|node| *node >= time).unwrap_or(times.len().checked_sub(1)?).max(1);
+    let (from, to) = (times.get(after - 1)?, times.get(after)?);
+    let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
+    let ends = path.get(after - 1)?.iter().zip(path.get(after)?);
+    Some(ends.map(|(a, b)| a + share * (b - a)).collect())
+}
+
+/// The problem of the rest from a seam on, with the nodes of what flies until the end.
+fn problem(
+    number: u64,
+    world: &ScenarioFile,
+    flying: &PlanFile,
+    seam: f64,
+    mut path: Vec<Vec<f64>>,
+) -> Option<Job> {
+    let times = flying.node_times();
+    let intervals = path.len().checked_sub(1).filter(|intervals| *intervals >= INTERVALS_MIN)?;
+    let duration = times.last()? - seam;
+    let interval = duration / intervals as f64;
+    let agent_plan = flying.agents.first()?;
     let mut scenario = world.clone();
     scenario.start_time = seam;
     scenario.intervals = intervals;
-    let interval = (last - seam) / intervals as f64;
-    let node_time = |node: usize| seam + interval * node as f64;
     let agent = scenario.agents.first_mut()?;
-    agent.start.clone_from(agent_plan.path.get(first)?);
-    agent.start_velocity = Some(at.velocity);
-    if let Some(jammer) = &mut agent.jammer {
-        jammer.budget = left(jammer.budget, &times, agent_plan.jam.as_deref(), seam);
-    }
-    if let Some(dropout) = &mut agent.dropout {
-        dropout.budget = left(dropout.budget, &times, agent_plan.dropout.as_deref(), seam);
-    }
-    // Nodes of unequal times are not those of a new plan: the curve between them is.
-    let sampled = || (0..=intervals).map(|node| curve.sample(node_time(node)).position).collect();
-    let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
-    let mut path: Vec<Vec<f64>> = if flying.times.is_some() { sampled() } else { nodes() };
-    path.first_mut()?.clone_from(&agent.start);
+    agent.start.clone_from(path.first()?);
+    agent.start_velocity = Some(Curve::of(flying, &agent_plan.name)?.sample(seam).velocity);
     path.last_mut()?.clone_from(&agent.goal);
-    let control = |values: &Option<Vec<f64>>| {
-        values.as_ref().map(|values| {
-            let at = |node: usize| step_value(&times, values, node_time(node));
-            (0..=intervals).map(at).collect()
-        })
-    };
-    let agents = vec![AgentPlan {
-        name: agent_plan.name.clone(),
-        path,
-        jam: control(&agent_plan.jam),
-        azimuth: control(&agent_plan.azimuth),
-        dropout: control(&agent_plan.dropout),
-    }];
-    let duration = last - seam;
+    let budgets = [&mut agent.jammer.as_mut().map(|jammer| &mut jammer.budget), &mut agent.dropout.as_mut().map(|dropout| &mut dropout.budget)];
+    let mut controls = [&agent_plan.jam, &agent_plan.dropout].map(|values| {
+        values.as_ref().map(|values| resampled(&times, values, seam, interval, intervals))
+    });
+    let before = [&agent_plan.jam, &agent_plan.dropout];
+    for ((budget, control), before) in budgets.into_iter().zip(&mut controls).zip(before) {
+        if let Some(budget) = budget {
+            **budget = left(**budget, &times, before.as_deref(), seam);
+            fit(control.as_mut(), interval, **budget);
+        }
+    }
+    let [jam, dropout] = controls;
+    let azimuth = agent_plan.azimuth.as_ref().map(|values| resampled(&times, values, seam, interval, intervals));
+    let agents = vec![AgentPlan { name: agent_plan.name.clone(), path, jam, azimuth, dropout }];
     let tail =
         PlanFile { scenario: flying.scenario.clone(), start_time: seam, duration, agents, ..PlanFile::default() };
     Some(Job { number, scenario, tail, seam })
+}
+
+/// A control at the nodes of the rest.
+fn resampled(times: &[f64], values: &[f64], seam: f64, interval: f64, intervals: usize) -> Vec<f64> {
+    (0..=intervals).map(|node| step_value(times, values, seam + interval * node as f64)).collect()
+}
+
+/// Lowers a control to its budget, which nodes at other times may exceed.
+fn fit(control: Option<&mut Vec<f64>>, interval: f64, budget: f64) {
+    let Some(control) = control else { return };
+    let spent = interval * control.iter().skip(1).sum::<f64>();
+    if spent > budget {
+        control.iter_mut().for_each(|value| *value *= budget / spent);
+    }
 }
 
 /// The value of a control at a time: that of the node at the end of the interval, as the integrals count it.

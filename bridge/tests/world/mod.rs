@@ -78,6 +78,8 @@ pub struct World {
     pub position: Vec<f64>,
     pub current: Option<u16>,
     pub silent: bool,
+    /// Heartbeats alone.
+    pub mute: bool,
     pub level: Option<f32>,
     pub power: Option<f32>,
     pub servo: Option<f32>,
@@ -103,6 +105,7 @@ impl World {
             position: vec![0.5, 0.5],
             current: None,
             silent: false,
+            mute: false,
             level: None,
             power: None,
             servo: None,
@@ -150,7 +153,8 @@ impl World {
             MavMessage::GLOBAL_POSITION_INT(position),
             MavMessage::EXTENDED_SYS_STATE(landed),
         ];
-        rest.into_iter().chain(current).collect()
+        let said = if self.mute { 1 } else { rest.len() };
+        rest.into_iter().take(said).chain(current).collect()
     }
 
     pub fn input(&mut self, input: Input) {

@@ -69,6 +69,11 @@ impl Guided {
         (self.target, self.streak) = (None, 0);
     }
 
+    /// Waits for the stream anew: the autopilot was away.
+    pub(super) fn wait(&mut self, now: Time) {
+        self.heard = self.heard.map(|_| now);
+    }
+
     /// Takes a setpoint. `frame` is that of home, in metres.
     pub(super) fn take(
         &mut self,

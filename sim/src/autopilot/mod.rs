@@ -307,6 +307,8 @@ impl Machine {
         self.now = self.now.max(now);
         self.suffer();
         self.move_on();
+        // Payloads are boxes of their own: they notice that nobody speaks to them.
+        self.payloads.iter_mut().for_each(|payload| payload.expire(self.now));
         if self.down.is_some() || self.killed.is_some() {
             self.out.clear();
             return Vec::new();

@@ -111,13 +111,18 @@ impl Payload {
         MavResult::MAV_RESULT_ACCEPTED
     }
 
-    /// Falls silent, and says what is due.
-    pub(super) fn poll(&mut self, now: Time, boot_ms: u32, out: &mut Vec<MavMessage>) {
+    /// Falls silent where it heard nothing for its time to live.
+    pub(super) fn expire(&mut self, now: Time) {
         if self.until.is_some_and(|until| now > until) {
             self.until = None;
             self.expiries += u64::from(self.level != rest(self.spec.kind));
             self.level = rest(self.spec.kind);
         }
+    }
+
+    /// Falls silent, and says what is due.
+    pub(super) fn poll(&mut self, now: Time, boot_ms: u32, out: &mut Vec<MavMessage>) {
+        self.expire(now);
         if self.heartbeat.is_none_or(|sent| now.since(sent) >= HEARTBEAT) {
             self.heartbeat = Some(now);
             out.push(MavMessage::HEARTBEAT(HEARTBEAT_DATA {

@@ -38,12 +38,13 @@ pub fn endpoint(machine: &Machine) -> Endpoint {
 }
 
 /// Lets a machine fly on a link until `each` says stop. Faults, by a seed, stand between the machine and the link, in both
-/// directions. `each` is asked at every [`STEP`] of the clock.
+/// directions. `hear` gets every frame as it comes, before faults; `each` is asked at least at every [`STEP`] of the clock.
 pub fn serve(
     machine: &mut Machine,
     link: &mut Link,
     clock: SystemClock,
     (faults, seed): (Faults, u64),
+    mut hear: impl FnMut(&Frame),
     mut each: impl FnMut(Moment<'_>) -> Go,
 ) -> Statistics {
     let (mut up, mut down) = (Wire::new(faults, seed), Wire::new(faults, seed.wrapping_add(1)));
@@ -55,8 +56,12 @@ pub fn serve(
                 None => break,
                 Some((_, Event::Up)) => trouble = None,
                 Some((_, Event::Down(why))) => trouble = Some(why),
-                Some((time, Event::Frame(frame))) => up.send(time, &frame.bytes),
+                Some((time, Event::Frame(frame))) => {
+                    hear(&frame);
+                    up.send(time, &frame.bytes);
+                }
             }
+            // What comes later is heard in the next round.
             wait = Duration::ZERO;
         }
         let now = clock.now();

@@ -64,6 +64,8 @@ impl Machine {
             self.boot = now;
             (self.heartbeat, self.heartbeats) = (None, 0);
             self.run.resume(self.body.position);
+            self.guided.wait(now);
+            self.hold = self.body.position;
         }
         let is_due = |trouble: &Trouble| match trouble {
             Trouble::Restart { at } | Trouble::Station { at, .. } => *at <= now,

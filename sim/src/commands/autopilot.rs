@@ -45,7 +45,7 @@ pub fn run(args: &AutopilotArgs) -> Result<Verdict, Failure> {
     let until = args.seconds.map(|seconds| Time::ZERO + seconds);
     let mut last = String::new();
     let mut failed = None;
-    let statistics = serve(&mut machine, &mut link, clock, (faults, args.seed), |moment| {
+    let statistics = serve(&mut machine, &mut link, clock, (faults, args.seed), |_| {}, |moment| {
         let told = tell(&moment, &mut last).and_then(|()| match &mut track {
             Some(track) => track.write(&moment),
             None => Ok(()),
