@@ -218,7 +218,7 @@ fn an_observation_asks_for_a_plan_at_once_where_it_may() {
         world.input(Input::Planned(reply));
         let before = world.setpoints.len();
         world.pass(0.3);
-        assert!(world.said.iter().any(|text| text.contains("the plan of 1.3 s flies")), "{:?}", world.said);
+        assert!(world.said.iter().any(|text| text.contains("the plan of 1.2 s flies")), "{:?}", world.said);
         assert!(world.setpoints.len() > before);
     }
 }

@@ -34,7 +34,7 @@ pub const PLAN: &str = r#"{"duration": 20.0, "agents": [{"name": "uav1",
 /// A jammer on board.
 pub const CONFIG: &str = "[[flight.payload]]\nkind = \"jammer\"\ncomponent = 26\n";
 
-/// A program of this workspace, built if it is not.
+/// A program of this workspace, built as tests build it: they are there already where all tests run.
 ///
 /// # Panics
 /// It cannot be built.
@@ -44,9 +44,11 @@ pub fn built(name: &str) -> PathBuf {
     let folder = FOLDER.get_or_init(|| {
         let here = std::env::current_exe().expect("a program knows where it is");
         let folder = here.ancestors().find(|folder| folder.join("deps").is_dir()).expect("a target folder");
-        let profile = if folder.ends_with("release") { "release" } else { "dev" };
+        let profile = if folder.ends_with("release") { "release" } else { "test" };
         let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--workspace", "--bins", "--profile", profile]);
+        // Tests that start a program are built with it. Other commands would build all crates with other features.
+        build.args(["test", "--no-run", "--quiet", "--workspace", "--test", "program", "--test", "cli"]);
+        build.args(["--profile", profile]);
         build.current_dir(crate::repository()).env("CARGO_TARGET_DIR", folder.parent().expect("a target folder"));
         assert!(build.status().is_ok_and(|status| status.success()), "the programs can be built");
         folder.to_owned()

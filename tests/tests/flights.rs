@@ -95,19 +95,29 @@ fn setup(truth: &ScenarioFile, first: &PlanFile, kind: Autopilot, mode: FlyMode)
 /// node that the vehicle flies to where it flies a mission.
 struct Schedule {
     plan: PlanFile,
+    /// The plan before it, which is flown up to where it begins.
+    before: Option<PlanFile>,
     next: Option<PlanFile>,
     /// The node that the vehicle flies to, where that is known.
     node: usize,
+    last: f32,
+    /// The mission in the vehicle: commands and places.
+    list: Vec<[i32; 3]>,
+    until: f64,
+    /// How long it may take until the vehicle is told where to go on, s.
+    grace: f64,
 }
 
 impl Schedule {
-    fn new(plan: &PlanFile) -> Self {
-        Self { plan: plan.clone(), next: None, node: 0 }
+    fn new(plan: &PlanFile, grace: f64) -> Self {
+        let (list, until) = (Vec::new(), 0.0);
+        Self { plan: plan.clone(), before: None, next: None, node: 0, last: 0.0, list, until, grace }
     }
 
     fn takes_over(&mut self) {
         if let Some(next) = self.next.take() {
-            (self.plan, self.node) = (next, 0);
+            self.before = Some(std::mem::replace(&mut self.plan, next));
+            self.node = 0;
         }
     }
 
@@ -122,25 +132,50 @@ impl Schedule {
         // The list in the vehicle is that of the plan that flies when its length fits; its last waypoint is the last node.
         let is_waypoint = |item: &&Item| item.command == MavCmd::MAV_CMD_NAV_WAYPOINT;
         let ahead = items.iter().skip(usize::from(current)).filter(is_waypoint).count();
-        if self.next.is_none() && ahead > 0 {
-            self.node = self.node.max(times.len().saturating_sub(ahead));
+        // A new plan is that of the vehicle when its list is; where it goes on in it is said a moment later.
+        let list: Vec<[i32; 3]> = items.iter().map(|item| [item.command as i32, item.x, item.y]).collect();
+        if self.list != list {
+            let is_first = self.list.is_empty();
+            self.list = list;
+            if !is_first {
+                self.takes_over();
+                self.until = time + self.grace;
+            }
         }
-        jam.get(self.node).copied().unwrap_or_default() as f32
+        if time < self.until {
+            return self.last;
+        }
+        let agent = self.plan.agents.first().expect("an agent");
+        let jam = agent.jam.as_deref().unwrap_or_default();
+        let times = self.plan.node_times();
+        let intervals = times.len() - 1;
+        self.last = match &self.before {
+            // Up to its first node a plan is the one before it.
+            Some(before) if ahead > intervals => {
+                let seam = before.node_times().iter().position(|time| (time - times[0]).abs() < 1e-6).expect("a node");
+                let node = (seam + 1 + intervals).checked_sub(ahead).expect("a node of the plan before");
+                before.agents[0].jam.as_ref().expect("a jammer")[node] as f32
+            }
+            _ => {
+                self.node = self.node.max(times.len().saturating_sub(ahead.max(1)));
+                jam.get(self.node).copied().unwrap_or_default() as f32
+            }
+        };
+        self.last
     }
 }
-
 fn fly(truth: &ScenarioFile, setup: Setup) -> Flown {
     let mode = setup.flight.mode;
     let frame = LocalFrame::of(truth).expect("it lies on the Earth");
     let mut flown = Flown { plans: vec![setup.plan.clone()], ..Flown::default() };
+    let mut schedule = Schedule::new(&flown.plans[0], if setup.faults == Faults::NONE { 0.1 } else { 1.0 });
     let mut flight = Rehearsal::new(setup).expect("a flight");
     let mut reported = f64::NEG_INFINITY;
-    let mut schedule = Schedule::new(&flown.plans[0]);
     while flight.end().is_none() {
         for event in flight.step().expect("loopback carries") {
             match event {
                 Event::Said(_, text) => {
-                    if text.contains("was replaced") || (text.starts_with("the plan of") && text.ends_with("flies")) {
+                    if text.starts_with("the plan of") && text.ends_with("flies") {
                         schedule.takes_over();
                     }
                     flown.said.push(format!("{:.2} {text}", flight.now().seconds()));

@@ -1,11 +1,11 @@
 //! The flight itself: along the plan, to the next plan, and out of it.
 
 use crate::command::Command;
-use crate::file::PlanFile;
-use crate::file::plan::AgentPlan;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
-use crate::replan::job::{Rejected, judge, rest, rest_at, step_value};
+use crate::clock::Time;
+use crate::replan::job::{Rejected, budgets_at, joined, judge, rest, rest_at};
+use crate::setpoint::Curve;
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -14,10 +14,12 @@ use super::{End, Flight, Flying, Level, Output, Phase};
 
 /// Time after the last node in which a steered vehicle settles, s.
 const SETTLE: f64 = 2.0;
+/// Times that are closer are the same, s.
+const NODE_TOLERANCE: f64 = 1e-6;
 /// How long a steered vehicle may take to the goal after its time, s.
 const ARRIVE_MAX: f64 = 30.0;
-/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off.
-const BEHIND: usize = 1;
+/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
+const BEHIND: usize = 2;
 
 impl Flight {
     pub(super) fn fly(&mut self, vehicle: &Vehicle) {
@@ -38,7 +40,8 @@ impl Flight {
             return self.give_up("the plan is older than its time to live".into());
         }
         let time = self.scenario_time();
-        if let Some(next) = self.next.take_if(|next| next.curve.begin() <= time) {
+        let is_steered = self.settings.mode == FlyMode::Guided;
+        if let Some(next) = self.next.take_if(|next| is_steered && next.curve.begin() <= time) {
             self.say(Level::Info, format!("the plan of {:.1} s flies", next.curve.begin()));
             // Its first setpoint does not wait for its turn.
             self.setpoint = None;
@@ -91,7 +94,8 @@ impl Flight {
         let is_due = time - self.flying.made >= replan.interval_s;
         let job = match prompt {
             Some(lead) => rest_at(self.jobs + 1, world, plan, time + lead),
-            None if is_due => rest(self.jobs + 1, world, plan, time + replan.lead_s),
+            // A mission takes over when it has been delivered.
+            None if is_due => rest(self.jobs + 1, world, plan, time + replan.lead_s + self.delivery_s),
             None => return,
         };
         self.is_news = false;
@@ -131,48 +135,37 @@ impl Flight {
         self.flying = next;
     }
 
-    /// Sends the rest of the mission by a new plan.
+    /// Sends the rest of the mission: what the plan that flies still does up to the seam, then the new plan.
     fn begin_update(&mut self, mut next: Flying) {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
+        let now = self.mission_time();
+        let plan = joined(&self.flying.plan, &next.plan, now);
+        let Some(curve) = plan.as_ref().and_then(|plan| Curve::of(plan, &self.agent)) else {
+            return self.say(Level::Warn, "a plan does not continue the one that flies");
+        };
+        next.budgets = plan.as_ref().and_then(|plan| budgets_at(&self.world, &self.flying.plan, plan.start_time));
+        (next.plan, next.curve) = (plan.unwrap_or_default(), curve);
         let mut mission = match self.mission_of(&next.plan) {
             Ok(mission) => mission,
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
         };
         mission.items.drain(..BEHIND.min(mission.items.len()));
-        self.carry_over(&mut next.plan);
-        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 0);
+        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 1);
         next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
-        self.next = Some(next);
+        (self.next, self.update_begun) = (Some(next), self.now);
     }
 
-    /// Until the first node of a new plan the old one goes on: its controls there are those of the new plan's node 0,
-    /// which no integral counts.
-    fn carry_over(&self, plan: &mut PlanFile) {
-        let time = plan.start_time;
-        let times = self.flying.plan.node_times();
-        let same = |agent: &&AgentPlan| agent.name == self.agent;
-        let Some(old) = self.flying.plan.agents.iter().find(same) else { return };
-        let Some(new) = plan.agents.iter_mut().find(|agent| agent.name == self.agent) else { return };
-        for (new, old) in
-            [(&mut new.jam, &old.jam), (&mut new.dropout, &old.dropout), (&mut new.azimuth, &old.azimuth)]
-        {
-            if let (Some(first), Some(old)) = (new.as_mut().and_then(|new| new.first_mut()), old) {
-                *first = step_value(&times, old, time);
-            }
-        }
-    }
-
-    /// The item of a new mission to go on at: its first, or the one behind it where that node was passed in the meantime.
-    fn first_item(&self, vehicle: &Vehicle, next: &Flying) -> u16 {
+    /// The item of a new mission that flies to the node that the vehicle is flying to, and since when.
+    fn item_to_go_on_at(&self, vehicle: &Vehicle, next: &Flying) -> (u16, Time) {
+        let (now, times) = (self.mission_time(), next.plan.node_times());
+        let node = times.iter().position(|time| *time >= now - NODE_TOLERANCE).unwrap_or(times.len()).max(1);
         // Item 0 of ArduPilot is home.
-        let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
-        if self.mission_time() <= next.curve.begin() {
-            return first;
-        }
-        let item = next.nodes.iter().position(|node| *node > 0).unwrap_or_default();
-        u16::try_from(item).unwrap_or(first)
+        let first = usize::from(vehicle.autopilot == Autopilot::ArduPilot);
+        let item = next.nodes.iter().skip(first).position(|of| *of >= node).unwrap_or_default() + first;
+        let since = self.item.map_or(self.now, |(_, since)| since);
+        (u16::try_from(item).unwrap_or(u16::MAX), since)
     }
 
     fn advance_update(&mut self, vehicle: &Vehicle) {
@@ -181,18 +174,16 @@ impl Flight {
         update.poll(self.now, &mut out);
         let result = update.result();
         self.send(out);
+        // Not only when it is proved: an autopilot that was given a new list may begin it anew.
+        if update.is_accepted() || matches!(result, Some(Ok(_))) {
+            self.go_on_by_new_mission(vehicle);
+        }
         match result {
             None => self.update = Some(update),
             Some(Ok(delivered)) => {
                 let kept = update.items().to_vec();
                 self.watch_over(Watch::new(self.talk(vehicle.identity, List::Mission), delivered), kept);
-                if let Some(next) = self.next.take() {
-                    // Autopilots disagree on what they keep: the item is always said.
-                    let first = self.first_item(vehicle, &next);
-                    self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
-                    self.take_over(next);
-                    (self.item, self.expected) = (Some((first, self.now)), Some((first, self.now)));
-                }
+                self.delivery_s = self.now.since(self.update_begun).as_secs_f64();
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
             }
             Some(Err(failure)) => {
@@ -200,6 +191,19 @@ impl Flight {
                 self.give_up(format!("the rest of the mission was not delivered: {failure}"));
             }
         }
+    }
+
+    /// The autopilot has the new mission: it is told where to go on.
+    fn go_on_by_new_mission(&mut self, vehicle: &Vehicle) {
+        let Some(next) = self.next.take() else { return };
+        // Autopilots disagree on what they keep: the item is always said.
+        let (item, since) = self.item_to_go_on_at(vehicle, &next);
+        let command = Command::set_current(item);
+        self.commands.submit(self.now, vehicle.identity, command);
+        // Twice, for half a second in the wrong direction is what a lost one costs.
+        self.send(vec![command.long(vehicle.identity, 0)]);
+        self.take_over(next);
+        (self.item, self.expected) = (Some((item, since)), Some((item, self.now)));
     }
 
     /// There is no plan to fly any more.

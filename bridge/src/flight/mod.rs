@@ -32,7 +32,6 @@ pub mod settings;
 
 use std::time::Duration;
 
-use quietpath_core::scenario::{Dropout, Jammer};
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Time;
@@ -44,6 +43,7 @@ use crate::link::dialect::MavMessage;
 use crate::link::{Frame, Identity};
 use crate::mission::{Delivery, Download, Item, List, Pace, Talk, Watch};
 use crate::payload::{Radiation, Relay};
+use crate::replan::job::Budgets;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
@@ -141,7 +141,7 @@ struct Flying {
     /// For each item of the mission the node that it flies to; empty where the bridge steers.
     nodes: Vec<usize>,
     /// Jammer and dropout with what is left of their budgets where the plan begins; the scenario's own where not given.
-    budgets: Option<(Option<Jammer<f64>>, Option<Dropout<f64>>)>,
+    budgets: Option<Budgets>,
 }
 
 /// A flight. See the [module](self).
@@ -168,6 +168,9 @@ pub struct Flight {
     next: Option<Flying>,
     /// A mission on its way while the one before it is flown.
     update: Option<Box<Delivery>>,
+    update_begun: Time,
+    /// How long the last mission took to be delivered, s.
+    delivery_s: f64,
     /// The clock's time at the start time of the scenario.
     zero: Option<Time>,
     /// In mission mode: the item that is flown to, and since when.
@@ -242,6 +245,8 @@ impl Flight {
             flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None },
             next: None,
             update: None,
+            update_begun: Time::ZERO,
+            delivery_s: 0.0,
             zero: None,
             item: None,
             expected: None,

@@ -101,6 +101,7 @@ impl Flight {
             self.phase = Phase::Ready;
             return;
         };
+        self.update_begun = self.now;
         let talk = self.talk(vehicle.identity, list);
         let delivery = Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace()));
         self.phase = Phase::Deliver { delivery, waiting };
@@ -118,6 +119,7 @@ impl Flight {
             Some(Ok(delivered)) => {
                 self.say(Level::Info, format!("the autopilot holds the {list}: {} items", delivered.count));
                 if list == List::Mission {
+                    self.delivery_s = self.now.since(self.update_begun).as_secs_f64();
                     self.watch_over(Watch::new(self.talk(vehicle.identity, list), delivered), kept);
                 }
                 self.next_delivery(vehicle, waiting);
@@ -216,8 +218,7 @@ impl Flight {
     /// Takes note of where the mission is, and of others who replace it.
     pub(super) fn follow_mission(&mut self, frame: &Frame) {
         let is_vehicle = self.telemetry.vehicle().is_some_and(|vehicle| vehicle.identity == frame.from);
-        // While the rest is replaced, a number may be of either list; the running item is flown to its end.
-        if is_vehicle && matches!(self.phase, Phase::Fly) && self.update.is_none() {
+        if is_vehicle && matches!(self.phase, Phase::Fly) {
             match &frame.message {
                 MavMessage::MISSION_CURRENT(data) => self.current_is(data.seq),
                 // Some say what is flown to now when they next say it, and this at once.
@@ -254,8 +255,10 @@ impl Flight {
             self.item = self.item.map(|(_, since)| (seq, since));
             return;
         }
-        // Going back is believed when it is said twice: frames overtake each other.
-        if self.item.is_some_and(|(item, _)| seq < item) && self.doubt.replace(seq) != Some(seq) {
+        // Going back is believed when it is said twice: frames overtake each other. And never while a new list is on its
+        // way: it may be there already, and begun anew.
+        let is_back = self.item.is_some_and(|(item, _)| seq < item);
+        if is_back && (self.next.is_some() || self.doubt.replace(seq) != Some(seq)) {
             return;
         }
         self.doubt = None;
