@@ -166,7 +166,14 @@ fn jamming_needs_the_switch_and_the_scenario() {
 }
 
 fn replanning(mode: FlyMode) -> Settings {
-    let replan = Replanning { interval_s: 5.0, lead_s: 2.0, deadline_s: 1.0, time_to_live_s: 12.0, sigma_max: 1.0, prompt_lead_s: None };
+    let replan = Replanning {
+        interval_s: 5.0,
+        lead_s: 2.0,
+        deadline_s: 1.0,
+        time_to_live_s: 12.0,
+        sigma_max: 1.0,
+        prompt_lead_s: None,
+    };
     Settings { replan: Some(replan), ..settings(mode) }
 }
 
@@ -228,7 +235,11 @@ fn a_goal_that_is_not_reached_is_a_failure() {
     let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
     world.begin(FlyMode::Guided);
     world.pass(75.0);
-    assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("did not come to the goal")), "{:?}", world.end);
+    assert!(
+        matches!(&world.end, Some(End::Failed(why)) if why.contains("did not come to the goal")),
+        "{:?}",
+        world.end
+    );
 }
 
 #[test]

@@ -132,7 +132,8 @@ fn first_setpoints(record: &Path, sent: &[(String, Instant)], came: &[(u32, Inst
     for line in BufReader::new(std::fs::File::open(record)?).lines().skip(1) {
         let value: Value = serde_json::from_str(&line?).unwrap_or_default();
         if let Some(observed) = value["in"]["observed"]["position"].as_array() {
-            let text = format!("[{:?},{:?}]", observed[0].as_f64().unwrap_or(0.0), observed[1].as_f64().unwrap_or(0.0));
+            let text =
+                format!("[{:?},{:?}]", observed[0].as_f64().unwrap_or(0.0), observed[1].as_f64().unwrap_or(0.0));
             asked = sent.iter().find(|(sent, _)| *sent == text).map(|(_, at)| *at);
             is_flying = false;
         }
@@ -212,7 +213,8 @@ pub fn endure(seconds: f64, speedup: f64) -> Endured {
     let (link, speed) = (format!("udpin:127.0.0.1:{port}"), speedup.to_string());
     let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
     let connect = format!("udpout:127.0.0.1:{port}");
-    let vehicle = ["autopilot", "--connect", &connect, "--like", "ardupilot", "--scenario", &scenario, "--pilot", "takeoff"];
+    let vehicle =
+        ["autopilot", "--connect", &connect, "--like", "ardupilot", "--scenario", &scenario, "--pilot", "takeoff"];
     let faults = ["--loss", "0.1", "--duplicate", "0.05", "--corrupt", "0.01", "--delay", "40", "--jitter", "80"];
     let mut vehicle = start(&built("quietpath"), &[&vehicle[..], &faults, &["--speedup", &speed]].concat());
     let (config, record) = (folder.path("bridge.toml"), folder.path("flight.jsonl"));

@@ -50,8 +50,10 @@ fn text(bytes: &[u8]) -> String {
 fn a_flight_over_udp_is_steered_recorded_and_replayed() {
     let folder = Folder::new();
     let port = free_port();
-    let vehicle =
-        autopilot(&folder, &["--connect", &format!("udpout:127.0.0.1:{port}"), "--like", "ardupilot", "--pilot", "takeoff"]);
+    let vehicle = autopilot(
+        &folder,
+        &["--connect", &format!("udpout:127.0.0.1:{port}"), "--like", "ardupilot", "--pilot", "takeoff"],
+    );
     let record = folder.path("flight.jsonl");
     let link = format!("udpin:127.0.0.1:{port}");
     let flight = bridge(&folder, &["--link", &link, "--mode", "guided", "--record", &record]);
@@ -63,7 +65,8 @@ fn a_flight_over_udp_is_steered_recorded_and_replayed() {
     let [north, east] = [(latitude - 47.4) * 111_170.0, (longitude - 8.5) * 75_500.0];
     assert!((north - 10.0).abs() < 5.0 && (east - 90.0).abs() < 5.0, "{north} {east}");
     assert!(std::fs::read_to_string(&track).expect("a track").contains(",Guided,1\n"), "it jams on the way");
-    let replay = Command::new(built("quietpath-bridge")).args(["replay", "--quiet", &record]).output().expect("it runs");
+    let replay =
+        Command::new(built("quietpath-bridge")).args(["replay", "--quiet", &record]).output().expect("it runs");
     assert!(replay.status.success(), "{}", text(&replay.stderr));
 }
 

@@ -1,9 +1,9 @@
 //! The flight itself: along the plan, to the next plan, and out of it.
 
+use crate::clock::Time;
 use crate::command::Command;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
-use crate::clock::Time;
 use crate::replan::job::{Rejected, budgets_at, joined, judge, rest, rest_at};
 use crate::setpoint::Curve;
 use crate::setpoint::Steering;

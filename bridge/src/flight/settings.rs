@@ -77,7 +77,14 @@ pub struct Replanning {
 
 impl Default for Replanning {
     fn default() -> Self {
-        Self { interval_s: 10.0, lead_s: 3.0, prompt_lead_s: None, deadline_s: 2.0, time_to_live_s: 30.0, sigma_max: f64::MAX }
+        Self {
+            interval_s: 10.0,
+            lead_s: 3.0,
+            prompt_lead_s: None,
+            deadline_s: 2.0,
+            time_to_live_s: 30.0,
+            sigma_max: f64::MAX,
+        }
     }
 }
 

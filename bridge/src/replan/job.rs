@@ -93,7 +93,8 @@ pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, earliest: f64)
     // Nodes of unequal times are not those of a new plan: the curve between them is.
     let sampled = || (0..=intervals).map(|node| curve.sample(seam + interval * node as f64).position).collect();
     let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
-    let mut steps = times.windows(2).skip(first).map(|pair| pair.last().zip(pair.first()).map_or(0.0, |(b, a)| b - a));
+    let mut steps =
+        times.windows(2).skip(first).map(|pair| pair.last().zip(pair.first()).map_or(0.0, |(b, a)| b - a));
     let is_even = steps.all(|step| (step - interval).abs() <= EVEN_TOLERANCE * interval);
     let mut path: Vec<Vec<f64>> = if is_even { nodes() } else { sampled() };
     path.first_mut()?.clone_from(agent_plan.path.get(first)?);
@@ -138,7 +139,14 @@ pub fn joined(flying: &PlanFile, next: &PlanFile, now: f64) -> Option<PlanFile> 
     });
     let duration = times.last()? - start_time;
     let agents = agents.collect();
-    Some(PlanFile { scenario: next.scenario.clone(), start_time, duration, times: Some(times), agents, ..PlanFile::default() })
+    Some(PlanFile {
+        scenario: next.scenario.clone(),
+        start_time,
+        duration,
+        times: Some(times),
+        agents,
+        ..PlanFile::default()
+    })
 }
 
 /// A control of what flies at the nodes from one to another, then that of another plan behind its first node.
@@ -160,7 +168,9 @@ fn chained(
 #[must_use]
 pub fn budgets_at(world: &ScenarioFile, flying: &PlanFile, time: f64) -> Option<Budgets> {
     let (times, agent, plan) = (flying.node_times(), world.agents.first()?, flying.agents.first()?);
-    let jammer = agent.jammer.map(|jammer| Jammer { budget: left(jammer.budget, &times, plan.jam.as_deref(), time), ..jammer });
+    let jammer = agent
+        .jammer
+        .map(|jammer| Jammer { budget: left(jammer.budget, &times, plan.jam.as_deref(), time), ..jammer });
     let dropout =
         agent.dropout.map(|dropout| Dropout { budget: left(dropout.budget, &times, plan.dropout.as_deref(), time) });
     Some((jammer, dropout))
@@ -176,13 +186,7 @@ fn straight(times: &[f64], path: &[Vec<f64>], time: f64) -> Option<Vec<f64>> {
 }
 
 /// The problem of the rest from a seam on, with the nodes of what flies until the end.
-fn problem(
-    number: u64,
-    world: &ScenarioFile,
-    flying: &PlanFile,
-    seam: f64,
-    mut path: Vec<Vec<f64>>,
-) -> Option<Job> {
+fn problem(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64, mut path: Vec<Vec<f64>>) -> Option<Job> {
     let times = flying.node_times();
     let intervals = path.len().checked_sub(1).filter(|intervals| *intervals >= INTERVALS_MIN)?;
     let duration = times.last()? - seam;

@@ -45,15 +45,22 @@ pub fn run(args: &AutopilotArgs) -> Result<Verdict, Failure> {
     let until = args.seconds.map(|seconds| Time::ZERO + seconds);
     let mut last = String::new();
     let mut failed = None;
-    let statistics = serve(&mut machine, &mut link, clock, (faults, args.seed), |_| {}, |moment| {
-        let told = tell(&moment, &mut last).and_then(|()| match &mut track {
-            Some(track) => track.write(&moment),
-            None => Ok(()),
-        });
-        let is_over = until.is_some_and(|until| moment.now >= until);
-        failed = told.err();
-        if is_over || failed.is_some() { Go::Stop } else { Go::On }
-    });
+    let statistics = serve(
+        &mut machine,
+        &mut link,
+        clock,
+        (faults, args.seed),
+        |_| {},
+        |moment| {
+            let told = tell(&moment, &mut last).and_then(|()| match &mut track {
+                Some(track) => track.write(&moment),
+                None => Ok(()),
+            });
+            let is_over = until.is_some_and(|until| moment.now >= until);
+            failed = told.err();
+            if is_over || failed.is_some() { Go::Stop } else { Go::On }
+        },
+    );
     if let Some(failure) = failed {
         return Err(failure);
     }

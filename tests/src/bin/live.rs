@@ -44,7 +44,13 @@ fn main() {
                 sorted.get(place).copied().unwrap_or(f64::NAN) * 1e3
             };
             println!("{} of {count} observations came to fly", sorted.len());
-            println!("median {:.1} ms, 90 % {:.1} ms, 99 % {:.1} ms, largest {:.1} ms", at(0.5), at(0.9), at(0.99), at(1.0));
+            println!(
+                "median {:.1} ms, 90 % {:.1} ms, 99 % {:.1} ms, largest {:.1} ms",
+                at(0.5),
+                at(0.9),
+                at(0.99),
+                at(1.0)
+            );
         }
         Figure::Load { seconds } => println!("{:.2} % of one core", 100.0 * live::load(seconds)),
         Figure::Endurance { seconds, speedup } => println!("{:#?}", live::endure(seconds, speedup)),
