@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 /// A flight of 80 m along the south that jams all the way.
 pub const SCENARIO: &str = r#"
-frame = { unit_m = 10.0, latitude_deg = 47.4, longitude_deg = 8.5, altitude_m = 20.0 }
+frame = { unit_m = 10.0, latitude_deg = 47.4, longitude_deg = 8.5, altitude_m = 40.0 }
 grid = { intervals = 4 }
 time = { max = 60.0 }
 domain = { min = [0.0, 0.0], max = [20.0, 20.0] }
@@ -47,7 +47,7 @@ pub fn built(name: &str) -> PathBuf {
         let profile = if folder.ends_with("release") { "release" } else { "test" };
         let mut build = Command::new(env!("CARGO"));
         // Tests that start a program are built with it. Other commands would build all crates with other features.
-        build.args(["test", "--no-run", "--quiet", "--workspace", "--test", "program", "--test", "cli"]);
+        build.args(["test", "--no-run", "--quiet", "--workspace", "--test", "interoperate", "--test", "cli"]);
         build.args(["--profile", profile]);
         build.current_dir(crate::repository()).env("CARGO_TARGET_DIR", folder.parent().expect("a target folder"));
         assert!(build.status().is_ok_and(|status| status.success()), "the programs can be built");
@@ -144,4 +144,37 @@ pub fn start(program: &Path, arguments: &[&str]) -> Child {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
     command.spawn().expect("the program runs")
+}
+
+/// `quietpath-bridge` with some arguments.
+#[must_use]
+pub fn bridge(arguments: &[&str]) -> Command {
+    let mut command = Command::new(built("quietpath-bridge"));
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null());
+    command
+}
+
+/// Runs `quietpath-bridge` to its end: status, standard output, standard error.
+///
+/// # Panics
+/// It cannot be started.
+#[must_use]
+pub fn run(arguments: &[&str]) -> (i32, String, String) {
+    text(&bridge(arguments).output().expect("the program runs"))
+}
+
+/// Asks a program to end, and waits: status, standard output, standard error.
+///
+/// # Panics
+/// It cannot be asked.
+#[must_use]
+pub fn terminate(child: Child) -> (i32, String, String) {
+    let asked = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(asked.is_ok_and(|status| status.success()), "kill");
+    text(&child.wait_with_output().expect("it ends"))
+}
+
+fn text(output: &Output) -> (i32, String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code().unwrap_or(-1), text(&output.stdout), text(&output.stderr))
 }

@@ -1,6 +1,5 @@
 //! Flights against a stand-in for a vehicle, under a clock of the test's own.
 
-mod fake;
 mod world;
 
 use quietpath_bridge::clock::Time;
@@ -10,10 +9,11 @@ use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Settings};
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::Identity;
 use quietpath_bridge::link::dialect::*;
-use quietpath_bridge::mission::Item;
+use quietpath_bridge::mission::{Item, List};
 use quietpath_bridge::record::{Recorder, replay};
 use quietpath_bridge::replan::{Answer, Observation};
 use quietpath_bridge::telemetry::{Autopilot, Mode};
+use quietpath_sim::autopilot::storage::ack;
 
 use world::{SCENARIO, World, plan, scenario, settings};
 
@@ -362,7 +362,7 @@ fn an_overheard_acceptance_is_looked_into() {
             world.missions.lists[0][5].x += 5000;
         }
         let station = Identity { system: 255, component: 190 };
-        world.frame(fake::ack(station, 0, MavMissionResult::MAV_MISSION_ACCEPTED, 0));
+        world.frame(ack(station, List::Mission.mission_type(), MavMissionResult::MAV_MISSION_ACCEPTED, 0));
         world.pass(3.0);
         let released = matches!(&world.end, Some(End::Released(why)) if why.contains("another station"));
         assert_eq!(released, replaced, "{:?} {:?}", world.end, world.said);

@@ -1,6 +1,5 @@
 //! A vehicle that does what it is told at once, around a flight, under a clock of the test's own.
 
-use super::fake::{FakeVehicle, VEHICLE};
 use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
@@ -13,6 +12,9 @@ use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::record::Recorder;
 use quietpath_bridge::replan::Job;
 use quietpath_bridge::telemetry::{Airframe, Autopilot, Mode, mode_command};
+use quietpath_sim::autopilot::storage::Storage;
+
+pub const VEHICLE: Identity = Identity { system: 1, component: 1 };
 
 pub const SCENARIO: &str = r#"
 name = "line"
@@ -70,7 +72,7 @@ pub struct World {
     pub flight: Flight,
     pub kind: Autopilot,
     pub now: u64,
-    pub missions: FakeVehicle,
+    pub missions: Storage,
     pub armed: bool,
     pub landed: MavLandedState,
     pub custom_mode: u32,
@@ -97,7 +99,7 @@ impl World {
             flight,
             kind,
             now: 0,
-            missions: FakeVehicle::new(kind),
+            missions: Storage::new(kind, VEHICLE),
             armed: false,
             landed: MavLandedState::MAV_LANDED_STATE_ON_GROUND,
             custom_mode: 0,
