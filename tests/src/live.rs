@@ -9,6 +9,7 @@
 //! `cargo run --package quietpath-tests --bin live` prints them. Nothing here is a test of time: other work on the machine
 //! shows in all of it.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead as _, BufReader};
 use std::net::UdpSocket;
 use std::path::Path;
@@ -86,12 +87,21 @@ fn vehicle(folder: &Folder, port: u16, seconds: f64) -> std::thread::JoinHandle<
     })
 }
 
+/// What became of observations.
+#[derive(Clone, Debug, Default)]
+pub struct Latencies {
+    /// From being sent to the first setpoint of the plan that they asked for, s, in order of size.
+    pub seconds: Vec<f64>,
+    /// Plans that did not fly: why, and how many.
+    pub refused: BTreeMap<String, usize>,
+}
+
 /// Latencies of `count` observations of square8-detection (60 intervals, 8 sensors), s, in order of size.
 ///
 /// # Panics
 /// The programs do not start, or the flight does not come about.
 #[must_use]
-pub fn latencies(count: usize) -> Vec<f64> {
+pub fn latencies(count: usize) -> Latencies {
     let folder = Folder::new();
     let config = "[flight]\nmode = \"guided\"\nsetpoint_hz = 20.0\n[flight.replan]\ninterval_s = 1000.0\n\
                   time_to_live_s = 1000.0\nprompt_lead_s = 0.02\ndeadline_s = 1.0\n";
@@ -122,13 +132,13 @@ pub fn latencies(count: usize) -> Vec<f64> {
     let _ = bridge.wait();
     let (came, _) = flying.join().expect("the vehicle flew");
     let mut found = first_setpoints(Path::new(&record), &sent, &came).expect("a record");
-    found.sort_by(f64::total_cmp);
+    found.seconds.sort_by(f64::total_cmp);
     found
 }
 
 /// For each observation the time from when it was sent to when the first setpoint of its plan came.
-fn first_setpoints(record: &Path, sent: &[(String, Instant)], came: &[(u32, Instant)]) -> io::Result<Vec<f64>> {
-    let (mut asked, mut is_flying, mut found) = (None, false, Vec::new());
+fn first_setpoints(record: &Path, sent: &[(String, Instant)], came: &[(u32, Instant)]) -> io::Result<Latencies> {
+    let (mut asked, mut is_flying, mut found) = (None, false, Latencies::default());
     for line in BufReader::new(std::fs::File::open(record)?).lines().skip(1) {
         let value: Value = serde_json::from_str(&line?).unwrap_or_default();
         if let Some(observed) = value["in"]["observed"]["position"].as_array() {
@@ -138,13 +148,16 @@ fn first_setpoints(record: &Path, sent: &[(String, Instant)], came: &[(u32, Inst
             is_flying = false;
         }
         for out in value["out"].as_array().into_iter().flatten().filter_map(Value::as_str) {
+            if let Some((_, why)) = out.split_once("does not fly: ") {
+                *found.refused.entry(why.to_owned()).or_insert(0) += 1;
+            }
             is_flying |= out.starts_with("say Info the plan of") && out.ends_with("flies");
             let bytes = out.strip_prefix("send ").filter(|_| is_flying && asked.is_some());
             let Some(frame) = bytes.and_then(bytes_of).and_then(|bytes| Frame::parse(&bytes)) else { continue };
             let MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data) = frame.message else { continue };
             let arrived = came.iter().find(|(boot, _)| *boot == data.time_boot_ms);
             if let (Some(asked), Some((_, arrived))) = (asked.take(), arrived) {
-                found.push(arrived.duration_since(asked).as_secs_f64());
+                found.seconds.push(arrived.duration_since(asked).as_secs_f64());
             }
         }
     }

@@ -38,12 +38,15 @@ enum Figure {
 fn main() {
     match Arguments::parse().figure {
         Figure::Latency { count } => {
-            let sorted = live::latencies(count);
+            let live::Latencies { seconds: sorted, refused } = live::latencies(count);
             let at = |share: f64| {
                 let place = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
                 sorted.get(place).copied().unwrap_or(f64::NAN) * 1e3
             };
             println!("{} of {count} observations came to fly", sorted.len());
+            for (why, count) in refused {
+                println!("{count} plans did not fly: {why}");
+            }
             println!(
                 "median {:.1} ms, 90 % {:.1} ms, 99 % {:.1} ms, largest {:.1} ms",
                 at(0.5),
