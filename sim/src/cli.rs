@@ -37,6 +37,9 @@ pub struct Cli {
 pub enum Command {
     /// Plan a flight; print a summary, write the plan, pictures and mission files
     #[command(after_help = "\
+A scenario with `[rolling]` is planned in steps, each of which knows the world as it is by then; what is written, and
+weighed, is the path that was flown, and `steps/` in the folder holds the plan of each step.
+
 Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
 
 Example:

@@ -6,6 +6,7 @@ pub mod completions;
 pub mod landscape;
 pub mod new;
 pub mod plan;
+pub mod steps;
 pub mod trade;
 
 use quietpath_bridge::file::ScenarioFile;
