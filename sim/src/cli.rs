@@ -87,7 +87,7 @@ other end must have the same speed. The same seed has the same faults.
 Exit status: 0 its time is over, 2 bad input.
 
 Example:
-  quietpath autopilot --connect udpout:127.0.0.1:14540 --like px4 --scenario scenario.toml --pilot takeoff")]
+  quietpath autopilot --connect udpout:127.0.0.1:14540 --like px4 --scenario scenario.toml")]
     Autopilot(Box<AutopilotArgs>),
     /// Print the completions of a shell
     #[command(after_help = "\
