@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use quietpath_core::horizon::NEAR_ITERATIONS;
 use quietpath_core::solver::{self, Settings, Start, Status, Workspace};
 use quietpath_core::{Point, Real};
 
@@ -41,6 +42,8 @@ pub struct Options {
     pub precision: Precision,
     /// Largest number of iterations; the planner's own choice where it is not given.
     pub iterations: Option<usize>,
+    /// Largest number of projected-gradient iterations before the refinement, where fewer than the planner's own choice.
+    pub gradient_iterations: Option<usize>,
     /// Time after which the best plan so far is returned, of each step where there are steps. With one, the same call may
     /// give different plans.
     pub deadline: Option<Duration>,
@@ -91,6 +94,19 @@ pub fn plan(scenario: &ScenarioFile, options: &Options) -> Result<Planned, Box<F
 pub fn improve(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -> Result<Planned, Box<FileError>> {
     earlier.fits("the earlier plan", scenario)?;
     begin(scenario, options, Some(earlier))
+}
+
+/// Plans the rest of a flight from what is left of the plan that flies, as a step of the rolling horizon does: the earlier
+/// plan is refined after a few iterations, and only where that finds nothing feasible is this [`improve`].
+///
+/// A deadline is that of each of the two.
+///
+/// # Errors
+/// As [`improve`].
+pub fn renew(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -> Result<Planned, Box<FileError>> {
+    let near = Options { gradient_iterations: Some(NEAR_ITERATIONS), ..*options };
+    let planned = improve(scenario, earlier, &near)?;
+    if planned.assessment.feasible { Ok(planned) } else { improve(scenario, earlier, options) }
 }
 
 fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>) -> Result<Planned, Box<FileError>> {
@@ -144,6 +160,9 @@ pub(super) fn settings<T: Real>(options: &Options) -> Settings<T> {
     if let Some(iterations) = options.iterations {
         settings.iterations = iterations;
         settings.refinements = settings.refinements.min(iterations);
+    }
+    if let Some(iterations) = options.gradient_iterations {
+        settings.iterations = settings.iterations.min(iterations);
     }
     settings
 }

@@ -59,6 +59,6 @@ impl Worker {
 /// Why there is no plan.
 pub fn carry_out(job: &Job, deadline: Duration) -> Result<(crate::file::PlanFile, bool), String> {
     let options = Options { deadline: Some(deadline), rollout: planning::Rollout::Once, ..Options::default() };
-    let planned = planning::improve(&job.scenario, &job.tail, &options).map_err(|error| error.to_string())?;
+    let planned = planning::renew(&job.scenario, &job.tail, &options).map_err(|error| error.to_string())?;
     Ok((planned.plan, planned.assessment.feasible))
 }
