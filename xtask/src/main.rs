@@ -1,4 +1,4 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `count`.
+//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `live`, `count`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -48,6 +48,8 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
+    Live,
     /// The instructions of one plan, counted by valgrind, in all and by function
     Count {
         /// A published scenario
@@ -73,6 +75,9 @@ fn run(command: &Command) -> anyhow::Result<bool> {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in a folder of the repository")?;
     let steps = match command {
         Command::Bench { arguments } => vec![bench(arguments)],
+        Command::Live => {
+            vec![Step::cargo("the bridge in flight", "run --release --package quietpath-tests --bin live")]
+        }
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Check => check(),
         Command::Test => test(),
@@ -103,7 +108,8 @@ fn check() -> Vec<Step> {
 }
 
 fn test() -> Vec<Step> {
-    let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
+    // With the whole workspace, or its crates are built again with other features.
+    let interoperate = "test --workspace --test interoperate -- --ignored";
     let mut steps =
         vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
     steps.extend(target());
