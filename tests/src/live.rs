@@ -124,7 +124,7 @@ impl fmt::Display for Latencies {
 pub fn latencies(count: usize) -> Latencies {
     let folder = Folder::new();
     let config = "[flight]\nmode = \"guided\"\nsetpoint_hz = 20.0\n[flight.replan]\ninterval_s = 1000.0\n\
-                  time_to_live_s = 1000.0\nprompt_lead_s = 0.02\ndeadline_s = 1.0\n";
+                  time_to_live_s = 1000.0\nprompt_lead_s = 0.03\ndeadline_s = 1.0\n";
     prepare(&folder, "square8-detection", config);
     let (port, tracker) = (free_port(), free_port());
     let (record, link) = (folder.path("flight.jsonl"), format!("udpin:127.0.0.1:{port}"));

@@ -23,7 +23,7 @@ pub use assess::{AgentSeries, Assessment, assess};
 pub use landscape::{Grid, View, landscape};
 pub use obstacle::Obstacle;
 pub use roll::{Rolled, Step, roll, roll_through};
-pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan, renew};
+pub use solve::{HostWorkspace, Memory, Options, Planned, Precision, Rollout, improve, plan, renew};
 
 pub use quietpath_core::horizon::Choice;
 pub use quietpath_core::solver::{Extent, Status};
