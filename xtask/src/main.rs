@@ -1,4 +1,4 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `count`,
+//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `live`, `count`,
 //! `fuzz`, `numbers`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
@@ -66,6 +66,8 @@ enum Command {
     },
     /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
     Deny,
+    /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
+    Live,
     /// The instructions of one plan, counted by valgrind, in all and by function
     Count {
         /// A published scenario
@@ -91,6 +93,9 @@ fn run(command: &Command) -> anyhow::Result<bool> {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in a folder of the repository")?;
     let steps = match command {
         Command::Bench { arguments } => vec![bench(arguments)],
+        Command::Live => {
+            vec![Step::cargo("the bridge in flight", "run --release --package quietpath-tests --bin live")]
+        }
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
@@ -124,7 +129,8 @@ fn check() -> Vec<Step> {
 }
 
 fn test() -> Vec<Step> {
-    let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
+    // With the whole workspace, or its crates are built again with other features.
+    let interoperate = "test --workspace --test interoperate -- --ignored";
     let mut steps =
         vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
     steps.extend(target());

@@ -45,6 +45,7 @@ use crate::link::dialect::MavMessage;
 use crate::link::{Frame, Identity};
 use crate::mission::{Delivery, Download, Item, List, Pace, Talk, Watch};
 use crate::payload::{Radiation, Relay};
+use crate::replan::job::Budgets;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
@@ -57,6 +58,8 @@ pub use settings::{FlyMode, OnFailure, Settings};
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Time between two requests of the same mode.
 const MODE_AGAIN: Duration = Duration::from_secs(1);
+/// How old a position may be before it is asked for again.
+const FIX_MAX: Duration = Duration::from_secs(2);
 /// Longest that leaving takes.
 const LEAVE_MAX: Duration = Duration::from_secs(3);
 
@@ -143,8 +146,8 @@ struct Flying {
     made: f64,
     /// For each item of the mission the node that it flies to; empty where the bridge steers.
     nodes: Vec<usize>,
-    /// What is left of the budgets at its beginning, s: jamming, dropout.
-    left: (Option<f64>, Option<f64>),
+    /// Jammer and dropout with what is left of their budgets where the plan begins; the scenario's own where not given.
+    budgets: Option<Budgets>,
     /// Whether it is the rest of a mission that was replaced in flight.
     is_rest: bool,
 }
@@ -179,17 +182,27 @@ pub struct Flight {
     next: Option<Flying>,
     /// A mission on its way while the one before it is flown.
     update: Option<Box<Delivery>>,
+    update_begun: Time,
+    /// How long the last mission took to be delivered, s.
+    delivery_s: f64,
     /// The clock's time at the start time of the scenario.
     zero: Option<Time>,
     /// How far the scenario had got at that time, s.
     passed: f64,
     /// In mission mode: the item that is flown to, and since when.
     item: Option<(u16, Time)>,
+    /// An item that the vehicle was told to go on at, and when.
+    expected: Option<(u16, Time)>,
+    /// An item before the one that is flown to, said once.
+    doubt: Option<u16>,
     job: Option<(Box<Job>, Time)>,
     jobs: u64,
+    /// An observation came that no plan knows of.
+    is_news: bool,
     heartbeat: Option<Time>,
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
+    intervals_asked: Time,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -228,7 +241,6 @@ impl Flight {
         let relay = Relay::new(settings.payloads(), radiation);
         let telemetry = Telemetry::new(settings.autopilot.choice(), settings.system);
         let made = scenario.start_time;
-        let left = (entry.jammer.map(|jammer| jammer.budget), entry.dropout.map(|dropout| dropout.budget));
         let digest = resume::digest(scenario, plan, &settings);
         Ok(Self {
             settings,
@@ -250,17 +262,23 @@ impl Flight {
             kept: Vec::new(),
             check: None,
             phase: Phase::Connect,
-            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), left, is_rest: false },
+            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None, is_rest: false },
             next: None,
             update: None,
+            update_begun: Time::ZERO,
+            delivery_s: 0.0,
             zero: None,
             passed: 0.0,
             item: None,
+            expected: None,
+            doubt: None,
             job: None,
             jobs: 0,
+            is_news: false,
             heartbeat: None,
             setpoint: None,
             mode_asked: None,
+            intervals_asked: Time::ZERO,
             link_lost: false,
             out: Vec::new(),
         })
@@ -354,9 +372,7 @@ impl Flight {
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);
-            for (message, hertz) in INTERVALS {
-                self.commands.submit(self.now, vehicle.identity, Command::interval(message, hertz));
-            }
+            self.ask_for_intervals(vehicle.identity);
         }
         let mut out = Vec::new();
         if let MavMessage::TIMESYNC(data) = &frame.message
@@ -393,8 +409,9 @@ impl Flight {
     fn observe(&mut self, observation: &Observation) {
         let sigma_max = self.settings.replan.map_or(f64::MAX, |replan| replan.sigma_max);
         let now = self.scenario_time();
-        if let Err(why) = observation.apply(&mut self.world, now, sigma_max) {
-            self.say(Level::Warn, format!("an observation of {why}"));
+        match observation.apply(&mut self.world, now, sigma_max) {
+            Ok(()) => self.is_news = true,
+            Err(why) => self.say(Level::Warn, format!("an observation of {why}")),
         }
     }
 
@@ -418,6 +435,23 @@ impl Flight {
         self.phase = Phase::Ended;
         self.out.push(Output::Keep(None));
         self.out.push(Output::End(end));
+    }
+
+    fn ask_for_intervals(&mut self, vehicle: Identity) {
+        self.intervals_asked = self.now;
+        for (message, hertz) in INTERVALS {
+            self.commands.submit(self.now, vehicle, Command::interval(message, hertz));
+        }
+    }
+
+    /// A vehicle that is heard and does not say where it is has begun anew, or never heard the question.
+    fn ask_again_for_intervals(&mut self, vehicle: &Vehicle) {
+        let is_stale = vehicle.fix.is_none_or(|fix| self.now.since(fix.heard) > FIX_MAX);
+        let is_due = self.now.since(self.intervals_asked) > FIX_MAX;
+        if is_stale && is_due && self.now.since(vehicle.heard) < FIX_MAX && self.commands.under_way() == 0 {
+            self.say(Level::Warn, "the vehicle does not say where it is: asking again");
+            self.ask_for_intervals(vehicle.identity);
+        }
     }
 
     /// Asks for a mode, again and again until the vehicle has it.
@@ -449,6 +483,7 @@ impl Flight {
         }
         let mut out = Vec::new();
         self.timesync.poll(self.now, vehicle.identity, &mut out);
+        self.ask_again_for_intervals(&vehicle);
         let unanswered = self.commands.poll(self.now, self.round_trip, &mut out);
         self.send(out);
         for ended in unanswered {

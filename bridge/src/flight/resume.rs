@@ -99,15 +99,17 @@ impl Flight {
         self.out.push(Output::Keep(Some(Box::new(journal))));
     }
 
-    /// A new plan flies; its budgets are those of the flight from now on.
+    /// A new plan flies. What is spent before it is spent: its budgets are those of the rest.
     pub(super) fn take_over(&mut self, next: Flying) {
-        self.set_budgets(next.left);
+        if let (Some((jammer, dropout)), Some(agent)) = (next.budgets, self.world.agents.first_mut()) {
+            (agent.jammer, agent.dropout) = (jammer, dropout);
+        }
         self.flying = next;
         self.keep();
     }
 
     fn set_budgets(&mut self, (jam, dropout): (Option<f64>, Option<f64>)) {
-        let Some(agent) = self.world.agents.iter_mut().find(|agent| agent.name == self.agent) else { return };
+        let Some(agent) = self.world.agents.first_mut() else { return };
         if let (Some(jammer), Some(left)) = (&mut agent.jammer, jam) {
             jammer.budget = left;
         }
@@ -138,8 +140,7 @@ impl Flight {
         }
         self.set_budgets((journal.jam_left, journal.dropout_left));
         let (made, is_rest) = (journal.made, journal.is_rest);
-        let left = (journal.jam_left, journal.dropout_left);
-        self.flying = Flying { plan: journal.plan, curve, made, nodes: Vec::new(), left, is_rest };
+        self.flying = Flying { plan: journal.plan, curve, made, nodes: Vec::new(), budgets: None, is_rest };
         self.is_resumed = true;
         match self.settings.mode {
             FlyMode::Mission => self.pick_mission_up(vehicle),

@@ -46,6 +46,17 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
         Self { offset: [[Point::zeros(); NODES]; AGENTS], control, pace: T::zero() }
     }
 
+    /// Makes the ends zero, which a problem with other intervals may have left otherwise.
+    pub(super) fn pin_ends(&mut self, intervals: usize) {
+        for nodes in &mut self.offset {
+            for end in [0, intervals] {
+                if let Some(offset) = nodes.get_mut(end) {
+                    *offset = Point::zeros();
+                }
+            }
+        }
+    }
+
     /// Interior nodes 1 .. N-1 of each agent.
     pub(super) fn interior(&self, frame: &Frame<T, DIM, AGENTS>) -> impl Iterator<Item = &[Point<T, DIM>]> {
         let last = frame.intervals;

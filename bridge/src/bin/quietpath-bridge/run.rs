@@ -25,7 +25,7 @@ use crate::observe::Observations;
 use crate::state::State;
 
 /// Longest that the loop waits for a frame.
-const TICK: Duration = Duration::from_millis(10);
+const TICK: Duration = Duration::from_millis(4);
 /// Time between two status lines.
 const STATUS: Duration = Duration::from_secs(1);
 /// Time between two lines of the log that say the same as the status line, where nobody watches.
@@ -98,7 +98,9 @@ impl Loop {
                 }
             },
         };
-        let clock = SystemClock::start();
+        let clock = SystemClock::at_speed(args.speedup).ok_or_else(|| {
+            Outcome::Input("--speedup is how many times faster than time to fly: a number above 0".into())
+        })?;
         let observations = config.observed()?;
         let beginning =
             Beginning { scenario: &scenario, plan: &plan, settings: &settings, journal: journal.as_ref() };
@@ -118,7 +120,7 @@ impl Loop {
             Some(replan) => {
                 let deadline = Duration::try_from_secs_f64(replan.deadline_s)
                     .map_err(|_| Outcome::Input("flight.replan.deadline_s must be a time in seconds".into()))?;
-                Some(Worker::start(deadline).map_err(fault)?)
+                Some(Worker::start(clock.real(deadline)).map_err(fault)?)
             }
         };
         let stop = Arc::new(AtomicBool::new(false));

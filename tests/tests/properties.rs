@@ -4,9 +4,6 @@
 //! and never claim what is not so: autopilots give up by themselves after 5 or 8 seconds of silence. Every run draws the
 //! same cases; `PROPTEST_RNG_SEED` and `PROPTEST_CASES` draw others, and more.
 
-mod fake;
-
-use fake::{FakeVehicle, VEHICLE};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use quietpath_bridge::clock::Time;
@@ -19,7 +16,9 @@ use quietpath_bridge::mission::item::first_difference;
 use quietpath_bridge::mission::{Delivered, Delivery, Download, Failure, Item, List, Pace, Talk};
 use quietpath_bridge::telemetry::Autopilot;
 use quietpath_bridge::telemetry::param::ReadParam;
+use quietpath_sim::autopilot::storage::Storage;
 
+const VEHICLE: Identity = Identity { system: 1, component: 1 };
 const US: Identity = Identity::COMPANION;
 const TICK_MS: u64 = 50;
 /// Longest that anything may take, ms of the test's own clock.
@@ -126,7 +125,7 @@ fn deliver(
     count: usize,
     ways: (&mut Losses, &mut Losses),
 ) -> (Option<Result<Delivered, Failure>>, Vec<Item>) {
-    let mut vehicle = FakeVehicle::new(kind);
+    let mut vehicle = Storage::new(kind, VEHICLE);
     let talk = Talk { us: US, vehicle: VEHICLE, list: List::Mission };
     let mut delivery = Delivery::new(talk, kind, items(count), Pace::default());
     converse(
@@ -139,7 +138,9 @@ fn deliver(
             delivery.result().is_some()
         },
         |now, frame, out| match frame {
-            Some(frame) => vehicle.handle(now, frame, out),
+            Some(frame) => {
+                vehicle.handle(now, frame, out);
+            }
             None => vehicle.poll(now, out),
         },
     );
@@ -148,7 +149,7 @@ fn deliver(
 
 /// Reads a mission; how that ended, if it did.
 fn download(kind: Autopilot, count: usize, ways: (&mut Losses, &mut Losses)) -> Option<Result<Vec<Item>, Failure>> {
-    let mut vehicle = FakeVehicle::new(kind);
+    let mut vehicle = Storage::new(kind, VEHICLE);
     vehicle.lists[0] = items(count);
     let talk = Talk { us: US, vehicle: VEHICLE, list: List::Mission };
     let mut download = Download::new(talk, Pace::default());
@@ -162,7 +163,9 @@ fn download(kind: Autopilot, count: usize, ways: (&mut Losses, &mut Losses)) -> 
             download.result().is_some()
         },
         |now, frame, out| match frame {
-            Some(frame) => vehicle.handle(now, frame, out),
+            Some(frame) => {
+                vehicle.handle(now, frame, out);
+            }
             None => vehicle.poll(now, out),
         },
     );
