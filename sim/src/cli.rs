@@ -33,7 +33,7 @@ pub struct Cli {
 /// What can be asked.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Plan a flight; print a summary, write the plan, pictures and mission files
+    /// Plan a flight; print a summary, write the plan, a report, pictures and mission files
     #[command(after_help = "\
 Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
 
@@ -68,6 +68,30 @@ Exit status: 0 feasible, 1 not feasible, 2 bad input.
 Example:
   quietpath check scenario.toml out/plan.json")]
     Check(CheckArgs),
+    /// Put a plan on a page: map, diagrams, constraints, provenance, in one HTML file
+    #[command(after_help = "\
+The page needs no network and no program but a browser. `quietpath plan --out` writes it too.
+
+Exit status: 0 written, 1 written and the plan is not feasible, 2 bad input.
+
+Example:
+  quietpath report scenario.toml out/plan.json --out report.html")]
+    Report(ReportArgs),
+    /// Fly a plan many times through a world that is not quite the scenario's, and say how that went
+    #[command(after_help = "\
+What varies stands in the scenario's [study]: sensor positions, path loss, wind. Runs are written as they are done;
+started again with the same arguments, the study goes on where it was ended.
+
+Exit status: 0 flown, 2 bad input.
+
+Example:
+  quietpath study scenario.toml --runs 1000 --out study")]
+    Study(StudyArgs),
+    /// Put the shards of a study together
+    #[command(after_help = "\
+Example:
+  quietpath merge --out study shards/runs-1-of-2.jsonl shards/runs-2-of-2.jsonl")]
+    Merge(MergeArgs),
     /// Write a commented scenario to start from
     #[command(after_help = "\
 Example:
@@ -85,7 +109,7 @@ Example:
 pub struct PlanArgs {
     /// Scenario file; `-` reads it from standard input
     pub scenario: String,
-    /// Folder for plan.json, pictures and mission files; made where it is missing
+    /// Folder for plan.json, report.html, pictures and mission files; made where it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// File for the plan alone; `-` writes it to standard output and the summary to standard error
@@ -159,6 +183,75 @@ pub struct CheckArgs {
     pub scenario: String,
     /// Plan file; `-` reads it from standard input
     pub plan: String,
+}
+
+/// Arguments of `quietpath report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// Plan file; `-` reads it from standard input
+    pub plan: String,
+    /// Metric that the map shows first [default: that of the first objective term]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub metric: Option<MetricArg>,
+    /// File to write
+    #[arg(long, value_name = "FILE", default_value = "report.html")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `quietpath study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// Scenario file with a [study]; `-` reads it from standard input
+    pub scenario: String,
+    /// Number of runs
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pub runs: u64,
+    /// Plan file to fly [default: the scenario is planned]
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<String>,
+    /// Plan a scenario with `[rolling]` in one piece, every track known
+    #[arg(long)]
+    pub once: bool,
+    /// Fly the I-th part of N alone, such as 1/4
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Folder for runs, summary and pictures; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "study")]
+    pub out: PathBuf,
+}
+
+/// A part of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which part, from 1.
+    pub index: u32,
+    /// How many parts there are.
+    pub count: u32,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self { index, count }),
+            _ => Err("write I/N with I from 1 to N, such as 1/4".into()),
+        }
+    }
+}
+
+/// Arguments of `quietpath merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// Files of runs
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Folder for runs, summary and pictures; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "study")]
+    pub out: PathBuf,
 }
 
 /// Arguments of `quietpath new`.

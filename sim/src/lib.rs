@@ -6,17 +6,23 @@
 //! | [`commands`] | what each command does |
 //! | [`outcome`] | exit statuses, error messages, standard streams, progress |
 //! | [`report`] | the summaries and tables that commands print |
+//! | [`margins`] | how much room a plan leaves to every constraint |
+//! | [`page`] | the report as a page that moves |
 //! | [`illustrate`] | from plans to pictures |
 //! | [`picture`] | drawing: landscapes and series as SVG and PNG |
+//! | [`study`] | one plan, flown many times |
 //! | [`trade`] | plans over a range of deadlines or budgets |
 //! | [`units`] | from the scenario's units to the ones that people read |
 
 pub mod cli;
 pub mod commands;
 pub mod illustrate;
+pub mod margins;
 pub mod outcome;
+pub mod page;
 pub mod picture;
 pub mod report;
+pub mod study;
 pub mod trade;
 pub mod units;
 

@@ -56,7 +56,7 @@ pub fn obstacle(scenario: &ScenarioFile, obstacle: &Obstacle) -> String {
     format!("\n{BAD}no feasible plan{BAD:#}: {found}\n  help: {help}\n")
 }
 
-fn agent_rows(scenario: &ScenarioFile, assessment: &Assessment, agent: &AgentSeries) -> Vec<(&'static str, String)> {
+pub(crate) fn agent_rows(scenario: &ScenarioFile, assessment: &Assessment, agent: &AgentSeries) -> Vec<(&'static str, String)> {
     let mut rows = vec![("path length", units::length(agent.length * scenario.frame.unit_m))];
     if let Some(values) = agent.metric(Metric::Detection) {
         let (peak, node) = extreme(values, f64::max);
@@ -116,12 +116,12 @@ fn violation(assessment: &Assessment) -> String {
 }
 
 /// A span of time with a unit that suits it.
-fn span(seconds: f64) -> String {
+pub(crate) fn span(seconds: f64) -> String {
     if seconds < 1.0 { format!("{:.1} ms", 1e3 * seconds) } else { format!("{seconds:.2} s") }
 }
 
 /// A number with so many significant digits, without trailing zeros.
-fn trimmed_to(value: f64, digits: i32) -> String {
+pub(crate) fn trimmed_to(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }

@@ -5,7 +5,7 @@
 //! | [`plan`] | a plan of a scenario |
 //! | [`improve`] | the same, from an earlier plan |
 //! | [`assess()`] | objective, violations and series of a plan, in double precision, from its written numbers alone |
-//! | [`landscape()`] | a metric over the domain at one time |
+//! | [`landscape()`], [`landscapes`] | a metric over the domain at one time, and all of them |
 //!
 //! The core keeps everything in fixed-size structures of the host's capacities, hundreds of kilobytes each. They
 //! live on the heap, but pass through the stack while they are built, several times over without optimisation. All
@@ -17,7 +17,7 @@ mod obstacle;
 mod solve;
 
 pub use assess::{AgentSeries, Assessment, assess};
-pub use landscape::{Grid, View, landscape};
+pub use landscape::{Grid, View, landscape, landscapes};
 pub use obstacle::Obstacle;
 pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};
 

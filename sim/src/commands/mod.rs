@@ -5,6 +5,8 @@ pub mod completions;
 pub mod landscape;
 pub mod new;
 pub mod plan;
+pub mod report;
+pub mod study;
 pub mod trade;
 
 use quietpath_bridge::file::ScenarioFile;
@@ -23,6 +25,9 @@ pub fn run(cli: Cli) -> Result<Verdict, Failure> {
         Some(Command::Trade(args)) => trade::run(&args),
         Some(Command::Landscape(args)) => landscape::run(&args),
         Some(Command::Check(args)) => check::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
+        Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Merge(args)) => study::merge(&args),
         Some(Command::New(args)) => new::run(&args),
         Some(Command::Completions(args)) => completions::run(&args),
     }

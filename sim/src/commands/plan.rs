@@ -3,6 +3,7 @@
 //! | file in `--out` | what |
 //! |---|---|
 //! | `plan.json` | the plan |
+//! | `report.html` | all of it as one page that moves |
 //! | `landscape.svg`, `.png` | a metric over the area, the flight on it |
 //! | `series.svg`, `.png` | every figure along the flight |
 //! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
@@ -21,6 +22,7 @@ use quietpath_core::scenario::Metric;
 use super::{landscape, load};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
+use crate::page::{self, Story};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
 use crate::report;
 
@@ -80,7 +82,8 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
     }
     if let Some(folder) = &args.out {
         let flown = Flown { plan: &plan, assessment: &assessment };
-        let written = with_progress("drawing", || write_folder(scenario, flown, metric, folder))?;
+        let settings = settings(args);
+        let written = with_progress("drawing", || write_folder(scenario, flown, metric, &settings, folder))?;
         text.push_str(&list(folder, &written));
     }
     say(summary_to, &text)?;
@@ -94,6 +97,17 @@ fn options(args: &PlanArgs) -> Options {
     };
     let rollout = if args.once { Rollout::Once } else { Rollout::AsWritten };
     Options { precision, rollout, ..Options::default() }
+}
+
+/// What a report says of how the plan was made.
+fn settings(args: &PlanArgs) -> Vec<(String, String)> {
+    let precision = match args.precision {
+        PrecisionArg::F32 => "32 bits",
+        PrecisionArg::F64 => "64 bits",
+    };
+    let pieces = if args.once { "one piece, every track known" } else { "as the scenario says" };
+    let row = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+    vec![row("computed with", precision), row("planned in", pieces)]
 }
 
 /// The metric behind the flight: asked for, or that of the first term of the objective.
@@ -121,6 +135,7 @@ fn write_folder(
     scenario: &ScenarioFile,
     flown: Flown<'_>,
     metric: Metric,
+    settings: &[(String, String)],
     folder: &Path,
 ) -> Result<Written, Failure> {
     let mut files = Vec::new();
@@ -130,6 +145,9 @@ fn write_folder(
         Ok(())
     };
     put("plan.json".into(), flown.plan.to_json().as_bytes())?;
+    let (plan, assessment, background) = (flown.plan, flown.assessment, metric);
+    let story = Story { plan, assessment, steps: &[], tracks: &[], wire: &[], background, settings };
+    put("report.html".into(), page::html(scenario, &story)?.as_bytes())?;
     let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
     let pictures = [
         ("landscape", illustrate::landscape(scenario, &grid, Some(flown.plan)).map_err(Failure::input)?),

@@ -138,7 +138,8 @@ fn draw_panel(canvas: &mut Canvas, area: Area, panel: &Panel, time: &Scale, numb
 }
 
 /// The scale that shows a panel's values and bounds.
-fn value_scale(panel: &Panel) -> Scale {
+#[must_use]
+pub fn value_scale(panel: &Panel) -> Scale {
     let values = panel.lines.iter().flat_map(|line| line.points.iter().map(|[_, value]| *value));
     Scale::covering(values.chain(panel.bounds.iter().map(|bound| bound.value)), panel.kind)
 }

@@ -27,6 +27,7 @@
 //! | `[[region]]` `center` and `radius`, or `polygon` | length | one of them |
 //! | `[[region]]` `name`, `inside`, `from`, `until` | , , s, s | `region1` .., false: keep out, always |
 //! | `[[limit]]`, `[rolling]` | | none |
+//! | `[study]` `sensor_position`, `path_loss`, `wind` and their kin | length, , length/s | nothing varies |
 //!
 //! A polygon is a list of 3 to [`quietpath_core::scenario::VERTICES_MAX`] corners in order, in either direction, and
 //! strictly convex. Limits: [`crate::capacity`].
@@ -34,10 +35,12 @@
 mod convert;
 mod explain;
 mod read;
+mod study;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use convert::point;
+pub use study::{Study, Wind};
 
 use quietpath_core::scenario::{
     Detection, Dropout, Jammer, Limit, Pooling, Ranging, ReferencePoint, Side, Susceptibility, Term, Timing, Window,
@@ -238,6 +241,8 @@ pub struct ScenarioFile {
     pub limits: Vec<Limit<f64>>,
     /// A plan made in steps.
     pub rolling: Option<Rolling>,
+    /// What varies when the plan is flown many times.
+    pub study: Option<Study>,
 }
 
 /// A scenario, and what is odd about it.

@@ -8,6 +8,7 @@ use quietpath_core::scenario::{
     Sense, Side, Susceptibility, Term, Timing, Window,
 };
 
+use super::study::study;
 use super::{
     AgentEntry, Bounds, FrameSpec, KnotEntry, Loaded, MotionEntry, Origin, Outline, RegionEntry, Reveal, Rolling,
     ScenarioFile, SensorEntry,
@@ -35,6 +36,7 @@ const TOP: &[&str] = &[
     "region",
     "limit",
     "rolling",
+    "study",
 ];
 const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
 const AGENT: &[&str] =
@@ -93,6 +95,7 @@ fn scenario(source: &Source) -> Outcome<ScenarioFile> {
         regions: regions(&top)?,
         limits: limits(&top)?,
         rolling: rolling(&top)?,
+        study: study(&top)?,
     })
 }
 
@@ -102,7 +105,7 @@ fn section<'a>(top: &Table<'a>, key: &str, keys: &'static [&'static str], exampl
     top.table(key, keys)?.ok_or_else(|| top.error(key, "is missing", help))
 }
 
-fn positive_optional(table: &Table<'_>, key: &str) -> Outcome<Option<f64>> {
+pub(super) fn positive_optional(table: &Table<'_>, key: &str) -> Outcome<Option<f64>> {
     match table.number_optional(key)? {
         Some(value) if value <= 0.0 => {
             Err(table.error(key, format!("must be greater than 0, not {value}"), "give a positive number"))
