@@ -61,9 +61,11 @@ at the centres of the cells and in the scenario's units.
 Example:
   quietpath landscape scenario.toml --metric log_aee --out landscape.png --out landscape.csv")]
     Landscape(LandscapeArgs),
-    /// Recompute the objective and the violations of a plan
+    /// Look a scenario over and give advice, or recompute the objective and the violations of a plan
     #[command(after_help = "\
-Exit status: 0 feasible, 1 not feasible, 2 bad input.
+Without a plan: margins, goals that cannot be reached, sensors that do nothing.
+
+Exit status: 0 feasible, 1 not feasible or out of reach, 2 bad input.
 
 Example:
   quietpath check scenario.toml out/plan.json")]
@@ -92,6 +94,22 @@ Example:
 Example:
   quietpath merge --out study shards/runs-1-of-2.jsonl shards/runs-2-of-2.jsonl")]
     Merge(MergeArgs),
+    /// Make a scenario from QGroundControl plans, GeoJSON, KML or tables of sensors
+    #[command(after_help = "\
+From .plan: home, first and last waypoint, cruise speed, fences. From .geojson and .kml: points as sensors, polygons
+as regions to keep out of. From .csv: sensors, by name and latitude, longitude or east_m, north_m.
+What stands in no file is taken from the starter scenario and marked `assumed`.
+
+Example:
+  quietpath import mission.plan sensors.csv --out scenario.toml")]
+    Import(ImportArgs),
+    /// Print the JSON Schema of scenario files, for editors
+    #[command(after_help = "\
+An editor with support for TOML takes it from a first line `#:schema scenario.schema.json`.
+
+Example:
+  quietpath schema > scenario.schema.json")]
+    Schema,
     /// Write a commented scenario to start from
     #[command(after_help = "\
 Example:
@@ -182,7 +200,7 @@ pub struct CheckArgs {
     /// Scenario file; `-` reads it from standard input
     pub scenario: String,
     /// Plan file; `-` reads it from standard input
-    pub plan: String,
+    pub plan: Option<String>,
 }
 
 /// Arguments of `quietpath report`.
@@ -252,6 +270,20 @@ pub struct MergeArgs {
     /// Folder for runs, summary and pictures; made where it is missing
     #[arg(long, value_name = "DIR", default_value = "study")]
     pub out: PathBuf,
+}
+
+/// Arguments of `quietpath import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// Files: .plan, .geojson, .kml, .csv
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Scenario file to write; `-` for standard output
+    #[arg(long, value_name = "FILE", default_value = "scenario.toml")]
+    pub out: PathBuf,
+    /// Overwrite a file that exists
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of `quietpath new`.

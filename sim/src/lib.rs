@@ -2,10 +2,12 @@
 //!
 //! | module | what |
 //! |---|---|
+//! | [`advice`] | what is odd about a scenario, before it is planned |
 //! | [`cli`] | the command line: arguments and their explanations |
 //! | [`commands`] | what each command does |
 //! | [`outcome`] | exit statuses, error messages, standard streams, progress |
 //! | [`report`] | the summaries and tables that commands print |
+//! | [`import`](mod@import) | scenarios from the files of others |
 //! | [`margins`] | how much room a plan leaves to every constraint |
 //! | [`page`] | the report as a page that moves |
 //! | [`illustrate`] | from plans to pictures |
@@ -14,9 +16,11 @@
 //! | [`trade`] | plans over a range of deadlines or budgets |
 //! | [`units`] | from the scenario's units to the ones that people read |
 
+pub mod advice;
 pub mod cli;
 pub mod commands;
 pub mod illustrate;
+pub mod import;
 pub mod margins;
 pub mod outcome;
 pub mod page;

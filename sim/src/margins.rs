@@ -228,7 +228,7 @@ fn nearest_to_origin(leg: &[Vec<f64>]) -> f64 {
 }
 
 /// Distance of a point from a segment.
-fn off([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+pub(crate) fn off([x, y]: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     nearest_to_origin(&[vec![a[0] - x, a[1] - y], vec![b[0] - x, b[1] - y]])
 }
 
@@ -240,7 +240,7 @@ fn between(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> f64 {
 }
 
 /// Whether a convex ring, counter-clockwise, holds a point.
-fn holds(ring: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+pub(crate) fn holds(ring: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     let mut edges = ring.iter().zip(ring.iter().cycle().skip(1));
     edges.all(|(a, b)| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) > 0.0)
 }

@@ -2,10 +2,12 @@
 
 pub mod check;
 pub mod completions;
+pub mod import;
 pub mod landscape;
 pub mod new;
 pub mod plan;
 pub mod report;
+pub mod schema;
 pub mod study;
 pub mod trade;
 
@@ -28,6 +30,8 @@ pub fn run(cli: Cli) -> Result<Verdict, Failure> {
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Study(args)) => study::run(&args),
         Some(Command::Merge(args)) => study::merge(&args),
+        Some(Command::Import(args)) => import::run(&args),
+        Some(Command::Schema) => schema::run(),
         Some(Command::New(args)) => new::run(&args),
         Some(Command::Completions(args)) => completions::run(&args),
     }

@@ -22,7 +22,7 @@ use quietpath_core::scenario::Metric;
 use super::{landscape, load};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
-use crate::page::{self, Story};
+use crate::page::{self, Story, Way};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
 use crate::report;
 
@@ -146,7 +146,8 @@ fn write_folder(
     };
     put("plan.json".into(), flown.plan.to_json().as_bytes())?;
     let (plan, assessment, background) = (flown.plan, flown.assessment, metric);
-    let story = Story { plan, assessment, steps: &[], tracks: &[], wire: &[], background, settings };
+    let way = Way::Planned;
+    let story = Story { plan, way, assessment, steps: &[], wire: &[], background, settings };
     put("report.html".into(), page::html(scenario, &story)?.as_bytes())?;
     let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
     let pictures = [

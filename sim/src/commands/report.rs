@@ -6,7 +6,7 @@ use quietpath_bridge::planning;
 use super::{load, plan::background};
 use crate::cli::ReportArgs;
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
-use crate::page::{self, Story};
+use crate::page::{self, Story, Way};
 
 /// Writes the page.
 ///
@@ -22,8 +22,8 @@ pub fn run(args: &ReportArgs) -> Result<Verdict, Failure> {
     let story = Story {
         plan: &plan,
         assessment: &assessment,
+        way: Way::Planned,
         steps: &[],
-        tracks: &[],
         wire: &[],
         background: background(&scenario, args.metric)?,
         settings: &[("plan file".to_owned(), args.plan.clone())],

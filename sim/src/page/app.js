@@ -28,7 +28,7 @@ const moment = {
 
 function words(time) {
   const [unit, second] = data.clock;
-  return `${(time / second).toFixed(1)} ${unit}`;
+  return `${(time / second).toFixed(second > 1 ? 2 : 1)} ${unit}`;
 }
 
 get('title').textContent = data.title;
@@ -97,13 +97,10 @@ function play(on) {
 get('play').addEventListener('click', () => play(get('play').getAttribute('aria-pressed') !== 'true'));
 get('clock').addEventListener('submit', (event) => event.preventDefault());
 
-let width = 0;
-new ResizeObserver(() => {
-  if (document.body.clientWidth === width) return;
-  width = document.body.clientWidth;
+window.addEventListener('resize', () => {
   map.resize();
   charts.resize();
-}).observe(document.body);
+});
 
 function restyle() {
   map.restyle();
@@ -118,4 +115,6 @@ window.addEventListener('afterprint', () => {
   delete document.documentElement.dataset.theme;
   restyle();
 });
-moment.set(data.time[0]);
+// `report.html#t=120` opens at an instant, in seconds.
+const asked = Number(new URLSearchParams(location.hash.slice(1)).get('t') ?? NaN);
+moment.set(Number.isFinite(asked) ? asked : data.time[0]);

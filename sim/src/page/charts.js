@@ -16,7 +16,7 @@ class Charts {
 
   build() {
     this.plots = this.data.panels.map((panel, index) => this.plot(panel, this.figures[index]));
-    this.update();
+    this.updateSoon();
   }
 
   size(box) {
@@ -30,6 +30,7 @@ class Charts {
     const tables = panel.lines.map((line) => [line.times.map((at) => at / second), line.values]);
     const [times, ...values] = tables.length > 1 ? uPlot.join(tables) : tables[0] || [[], []];
     const axis = { stroke: theme.ink, grid: { stroke: theme.line, width: 1 }, ticks: { stroke: theme.line } };
+    const few = panel.log ? { splits: decades, filter: (plot, ticks) => ticks } : {};
     const several = agents.length > 1;
     const chart = new uPlot({
       ...this.size(box),
@@ -41,11 +42,14 @@ class Charts {
         y: { distr: panel.log ? 3 : 1, range: () => [panel.low, panel.high] },
       },
       axes: [
-        { ...axis, label: `time (${unit})`, labelSize: 18, size: 28 },
-        { ...axis, size: 58, values: (plot, ticks) => ticks.map((tick) => (tick === null ? '' : figure(tick))) },
+        { ...axis, label: `time (${unit})`, labelSize: 20, size: 30 },
+        {
+          ...axis, ...few, size: 64,
+          values: (plot, ticks) => ticks.map(mark),
+        },
       ],
       series: [
-        { label: unit, value: (plot, value) => (value === null ? '\u2013' : value.toFixed(1)) },
+        { label: `time (${unit})`, value: (plot, value) => (value === null ? '\u2013' : value.toFixed(second > 1 ? 2 : 1)) },
         ...panel.lines.map((line) => ({
           label: several ? agents[line.agent].name : panel.unit || 'value',
           stroke: () => tint(agents[line.agent].colour),
@@ -55,29 +59,29 @@ class Charts {
       ],
       hooks: {
         draw: [(plot) => panel.bounds.forEach(([value, words]) => bound(plot, value, words))],
-        setCursor: [(plot) => {
-          if (this.quiet || plot.cursor.left === undefined || plot.cursor.left < 0) return;
-          this.moment.set(plot.posToVal(plot.cursor.left, 'x') * second, plot);
-        }],
       },
     }, [times, ...values], box);
-    touch(chart, (left) => this.moment.set(chart.posToVal(left, 'x') * second, null));
+    pointed(chart, (left) => this.moment.set(chart.posToVal(left, 'x') * second, chart));
     return chart;
+  }
+
+  /** uPlot lays out in a microtask of its own: places are known behind it. */
+  updateSoon() {
+    queueMicrotask(() => this.update());
   }
 
   update(source) {
     const second = this.data.clock[1];
-    this.quiet = true;
     for (const plot of this.plots) {
-      if (plot !== source) plot.setCursor({ left: plot.valToPos(this.moment.time / second, 'x'), top: 10 }, false);
+      if (plot === source) continue;
+      plot.setCursor({ left: plot.valToPos(this.moment.time / second, 'x'), top: 10 }, false);
+      plot.setLegend({ idx: plot.valToIdx(this.moment.time / second) });
     }
-    this.quiet = false;
-    for (const plot of this.plots) if (plot !== source) plot.setLegend({ idx: plot.valToIdx(this.moment.time / second) });
   }
 
   resize() {
     this.plots.forEach((plot, index) => plot.setSize(this.size(this.figures[index])));
-    this.update();
+    this.updateSoon();
   }
 
   restyle() {
@@ -107,9 +111,35 @@ function bound(plot, value, words) {
   ctx.restore();
 }
 
-/** A finger that moves sideways over a chart moves the time. */
-function touch(plot, to) {
-  plot.over.addEventListener('pointermove', (event) => {
-    if (event.pointerType === 'touch') to(Math.min(Math.max(event.offsetX, 0), plot.over.clientWidth));
-  });
+/** A pointer over a chart moves the time; a finger does so sideways, and scrolls the page up and down. */
+function pointed(plot, to) {
+  const follow = (event) => {
+    const box = plot.over.getBoundingClientRect();
+    to(Math.min(Math.max(event.clientX - box.left, 0), box.width));
+  };
+  plot.over.addEventListener('mousemove', follow);
+  plot.over.addEventListener('pointermove', (event) => event.pointerType === 'touch' && follow(event));
+}
+
+/** Ticks of a logarithmic axis: powers of ten, and more where there are few of these. */
+function decades(plot) {
+  const { min, max } = plot.scales.y;
+  const span = Math.log10(max / min);
+  const leads = span < 2 ? [1, 2, 5] : [1];
+  const every = Math.max(1, Math.ceil(span / 5));
+  const ticks = [];
+  for (let power = Math.floor(Math.log10(min)); power <= Math.log10(max); power += 1) {
+    if (power % every === 0) ticks.push(...leads.map((lead) => lead * 10 ** power));
+  }
+  return ticks.filter((tick) => tick >= min && tick <= max);
+}
+
+/** A number on an axis. */
+function mark(tick) {
+  const size = Math.abs(tick);
+  if (tick === 0 || (size < 1e5 && size >= 1e-3)) return figure(tick);
+  const power = Math.floor(Math.log10(size) + 1e-9);
+  const raised = [...String(power)].map((digit) => '\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079'[digit] ?? '\u207b').join('');
+  const lead = Number((tick / 10 ** power).toPrecision(3));
+  return lead === 1 ? `10${raised}` : `${lead}\u00b710${raised}`;
 }

@@ -35,14 +35,14 @@ const COLOURS: u32 = 256;
 /// A plan and all that is known of how it came about and was flown.
 #[derive(Clone, Debug)]
 pub struct Story<'a> {
-    /// The plan: what was flown of each step, where it was made in steps.
+    /// The plan; what was flown of each step, where it was made in steps; or the way that a vehicle took.
     pub plan: &'a PlanFile,
+    /// Which of these.
+    pub way: Way,
     /// Its figures.
     pub assessment: &'a Assessment,
     /// The plan of each step, in order; none where it was made in one piece.
     pub steps: &'a [PlanFile],
-    /// What was flown; none of a plan that is on paper.
-    pub tracks: &'a [Track],
     /// What went over the wire; none where nothing did.
     pub wire: &'a [Message],
     /// The landscape that shows first.
@@ -51,15 +51,13 @@ pub struct Story<'a> {
     pub settings: &'a [(String, String)],
 }
 
-/// The way that a vehicle took.
-#[derive(Clone, Debug, Default)]
-pub struct Track {
-    /// Index of the agent.
-    pub agent: usize,
-    /// Instants, s.
-    pub times: Vec<f64>,
-    /// Positions, length units of the scenario.
-    pub path: Vec<Vec<f64>>,
+/// Whether a way is on paper, or a vehicle took it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Planned.
+    Planned,
+    /// Flown.
+    Flown,
 }
 
 /// Something that went over the wire.
@@ -190,9 +188,8 @@ struct Room {
 pub fn gather(scenario: &ScenarioFile, story: &Story<'_>) -> Result<Data, Box<FileError>> {
     let plan = story.plan;
     let times = plan.node_times();
-    let last_flown = story.tracks.iter().filter_map(|track| track.times.last()).copied().fold(f64::NEG_INFINITY, f64::max);
     let first = times.first().copied().unwrap_or(scenario.start_time);
-    let time = [first, times.last().copied().unwrap_or(first + 1.0).max(last_flown)];
+    let time = [first, times.last().copied().unwrap_or(first + 1.0)];
     let scale = map_unit(scenario).1;
     let flown = Flown { plan, assessment: story.assessment };
     let panels = illustrate::panels(scenario, flown, 1.0);
@@ -274,13 +271,11 @@ fn paths(story: &Story<'_>, scale: f64) -> Vec<Path> {
         plan.agents.iter().enumerate().map(way).collect()
     };
     let mut paths: Vec<Path> = story.steps.iter().flat_map(|plan| of_plan("step", plan)).collect();
-    paths.extend(of_plan("plan", story.plan));
-    paths.extend(story.tracks.iter().map(|track| {
-        let places: Vec<&[f64]> = track.path.iter().map(Vec::as_slice).collect();
-        let (x, y) = (along(&places, 0, scale), along(&places, 1, scale));
-        let times = track.times.clone();
-        Path { kind: "flown", agent: track.agent, times, x, y, jam: Vec::new(), dropout: Vec::new() }
-    }));
+    let kind = match story.way {
+        Way::Planned => "plan",
+        Way::Flown => "flown",
+    };
+    paths.extend(of_plan(kind, story.plan));
     paths
 }
 

@@ -172,6 +172,7 @@ const DASHES = [[], [10, 5], [3, 4], [12, 4, 3, 4]];
 class FlightMap {
   constructor(data, element, moment) {
     Object.assign(this, { data, element, moment, metric: 0 });
+    this.loudest = loudest(data);
     this.landscape = new Landscape(data.fields, data.map.colours);
     this.view = { x: [...data.map.x], y: [...data.map.y] };
     this.plot = this.build();
@@ -182,20 +183,20 @@ class FlightMap {
   size() {
     const { x, y } = this.data.map;
     const width = Math.max(260, this.element.clientWidth);
-    const [left, below] = [62, 50];
-    const height = ((width - left - 12) * (y[1] - y[0])) / (x[1] - x[0]) + below + 12;
+    const [left, below] = [66, 56];
+    const height = ((width - left - 20) * (y[1] - y[0])) / (x[1] - x[0]) + below + 12;
     return { width, height: Math.max(160, Math.min(height, 1.5 * width)) };
   }
 
   build() {
     const theme = colours();
     const axis = (label, side) => ({
-      scale: side === 2 ? 'x' : 'y', side, label: `${label} (${this.data.map.unit})`, labelSize: 22, size: side === 2 ? 28 : 40,
-      stroke: theme.ink, grid: { show: false }, ticks: { stroke: theme.line },
+      scale: side === 2 ? 'x' : 'y', side, label: `${label} (${this.data.map.unit})`, labelSize: 24, size: side === 2 ? 32 : 42,
+      stroke: theme.ink, grid: { show: false }, ticks: { stroke: theme.line }, values: (plot, ticks) => ticks.map(mark),
     });
     return new uPlot({
       ...this.size(),
-      padding: [12, 12, 0, 0],
+      padding: [12, 20, 0, 0],
       legend: { show: false },
       cursor: { drag: { setScale: false, x: false, y: false } },
       scales: { x: { time: false, range: () => this.view.x }, y: { range: () => this.view.y } },
@@ -231,13 +232,14 @@ class FlightMap {
     const pen = new Pen(plot);
     this.regions(pen);
     const { time } = this.moment;
-    const of = (kind) => this.data.paths.filter((path) => path.kind === kind);
-    for (const path of of('step')) this.route(pen, path, { width: 1.4, alpha: this.inForce(path) ? 1 : 0.45, dash: [5, 4] });
-    const flown = of('flown');
-    for (const path of of('plan')) this.route(pen, path, { width: flown.length ? 2 : 3.2, alpha: 1, marks: true, dash: flown.length ? [6, 4] : DASHES[path.agent % DASHES.length] });
-    for (const path of flown) this.route(pen, path, { width: 3.2, alpha: 1, until: time });
+    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.route(pen, path, { width: 1.4, alpha: this.inForce(path) ? 1 : 0.45, dash: [5, 4] });
+    const main = this.data.paths.filter((path) => path.kind !== 'step');
+    for (const path of main) {
+      const flown = path.kind === 'flown';
+      this.route(pen, path, { width: 3.2, alpha: 1, marks: true, dash: DASHES[path.agent % DASHES.length], until: flown ? time : Infinity });
+    }
     this.sensors(pen);
-    for (const path of flown.length ? flown : of('plan')) {
+    for (const path of main) {
       const { x, y, heading } = placeAt(path, time);
       pen.vehicle(pen.at(x, y), heading, this.data.agents[path.agent].colour);
       if (this.data.agents.length > 1) pen.name(this.data.agents[path.agent].name, pen.at(x, y));
@@ -256,16 +258,17 @@ class FlightMap {
     const { colour } = this.data.agents[path.agent];
     const legs = (wanted) => points.slice(1).map((to, index) => [points[index], to, index + 1]).filter(([, , node]) => wanted(node));
     pen.context.globalAlpha = 0.6 * alpha;
-    for (const [a, b, node] of legs((node) => path.jam[node] > FAINTEST)) pen.line([a, b], '#fff3a6', 6 + 14 * Math.min(1, path.jam[node]));
+    for (const [a, b, node] of legs((node) => path.jam[node] > FAINTEST)) pen.line([a, b], '#fff3a6', 6 + (14 * path.jam[node]) / this.loudest);
     pen.context.globalAlpha = alpha;
     pen.line(points, 'rgba(255,255,255,0.9)', width + 2.4);
     pen.line(points, colour, width, dash);
     for (const rim of [[8.6, '#ffffff'], [6.4, colour], [2.6, '#ffffff']]) {
       for (const [a, b] of legs((node) => path.dropout[node] >= 0.5)) pen.line([a, b], rim[1], rim[0]);
     }
-    if (marks && points.length) {
-      pen.circle(points[0], 6, '#ffffff', colour, 3);
-      pen.square(points[points.length - 1], 12, colour, '#ffffff');
+    if (marks && path.x.length) {
+      const end = path.x.length - 1;
+      pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
+      pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
     }
     pen.context.globalAlpha = 1;
   }
@@ -340,8 +343,7 @@ class FlightMap {
 
   tap(left, top) {
     let best = { gap: 24, time: null };
-    const flown = this.data.paths.some((path) => path.kind === 'flown');
-    for (const path of this.data.paths.filter((path) => path.kind === (flown ? 'flown' : 'plan'))) {
+    for (const path of this.data.paths.filter((path) => path.kind !== 'step')) {
       path.times.forEach((time, node) => {
         const gap = Math.hypot(this.plot.valToPos(path.x[node], 'x') - left, this.plot.valToPos(path.y[node], 'y') - top);
         if (gap < best.gap) best = { gap, time };
@@ -387,6 +389,11 @@ class FlightMap {
     this.plot = this.build();
     this.follow();
   }
+}
+
+/** The highest jamming level of any path; node 0 has no interval. */
+function loudest(data) {
+  return data.paths.reduce((most, path) => path.jam.slice(1).reduce((a, b) => Math.max(a, b), most), 0);
 }
 
 function mean(ring, axis) {

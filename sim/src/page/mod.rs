@@ -19,7 +19,7 @@ pub mod field;
 
 use quietpath_bridge::file::{FileError, ScenarioFile};
 
-pub use data::{Message, Story, Track};
+pub use data::{Message, Story, Way};
 
 const HTML: &str = include_str!("page.html");
 const STYLE: [&str; 2] = [include_str!("../../vendor/uplot/uPlot.min.css"), include_str!("page.css")];

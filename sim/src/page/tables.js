@@ -43,12 +43,11 @@ function tables(data) {
 
 /** Where everything is at an instant, for those who do not see the map. */
 function positions(data, time) {
-  const flown = data.paths.some((path) => path.kind === 'flown');
   const at = (name, way) => {
     const { x, y } = placeAt(way, time);
     return [name, { text: x.toFixed(3), kind: 'number' }, { text: y.toFixed(3), kind: 'number' }];
   };
-  const vehicles = data.paths.filter((path) => path.kind === (flown ? 'flown' : 'plan'));
+  const vehicles = data.paths.filter((path) => path.kind !== 'step');
   table('positions', ['what', `east (${data.map.unit})`, `north (${data.map.unit})`], [
     ...vehicles.map((path) => at(data.agents[path.agent].name, path)),
     ...data.map.sensors.map((sensor) => at(sensor.name, sensor)),
@@ -78,7 +77,7 @@ function legend(data) {
   list.replaceChildren();
   const flown = has('flown');
   data.agents.forEach(({ name, colour }, index) => {
-    add(`${name}: ${flown ? 'planned, dashed; flown' : 'planned'}`, [line('#ffffff', 6, ''), line(colour, 3.2, flown ? '' : DASHES[index % DASHES.length].join(' '))]);
+    add(`${name}, ${flown ? 'flown' : 'planned'}`, [line('#ffffff', 6, ''), line(colour, 3.2, DASHES[index % DASHES.length].join(' '))]);
   });
   if (has('step')) add('plan of each step', [line('#ffffff', 4, ''), line(data.agents[0].colour, 1.4, '5 4')]);
   add('start', [['circle', { cx: 17, cy: 9, r: 6, fill: '#ffffff', stroke: data.agents[0].colour, 'stroke-width': 3 }]]);
@@ -86,6 +85,6 @@ function legend(data) {
   add('sensor', [back, ['circle', { cx: 17, cy: 9, r: 5, fill: '#ffffff', stroke: INK, 'stroke-width': 1.8 }]]);
   if (data.map.sensors.some((sensor) => sensor.x.length > 1)) add('track of a sensor', [back, line('#ffffff', 1.6, '7 5')]);
   if (data.map.regions.length) add('forbidden', [['rect', { x: 4, y: 1, width: 26, height: 16, fill: 'none', stroke: 'currentColor' }], ['path', { d: 'M4 17 L20 1 M12 17 L28 1 M20 17 L30 7', stroke: 'currentColor' }]]);
-  if (data.paths.some((path) => path.jam.some((level) => level > FAINTEST))) add('jamming (width: level)', [back, line('#fff3a6', 12, '')]);
+  if (data.paths.some((path) => path.jam.some((level) => level > FAINTEST))) add(`jamming (width: level, up to ${figure(Number(loudest(data).toFixed(2)))})`, [back, line('#fff3a6', 12, '')]);
   if (data.paths.some((path) => path.dropout.some((level) => level >= 0.5))) add('dropout (transmitter silent)', [line('#ffffff', 8.6, ''), line(data.agents[0].colour, 6.4, ''), line('#ffffff', 2.6, '')]);
 }

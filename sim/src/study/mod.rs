@@ -249,7 +249,8 @@ mod tests {
     const SCENARIO: &str = include_str!("../../scenarios/square8-detection.toml");
 
     fn scenario(study: &str) -> ScenarioFile {
-        ScenarioFile::parse("s.toml", &format!("{SCENARIO}\n{study}")).unwrap().scenario
+        let bare = SCENARIO.split("[study]").next().unwrap();
+        ScenarioFile::parse("s.toml", &format!("{bare}\n{study}")).unwrap().scenario
     }
 
     fn straight(scenario: &ScenarioFile) -> PlanFile {

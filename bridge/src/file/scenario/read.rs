@@ -18,7 +18,7 @@ use crate::file::FileError;
 use crate::file::error::suggestion;
 use crate::file::reader::{Outcome, Source, Table, Value};
 
-const TOP: &[&str] = &[
+pub(super) const TOP: &[&str] = &[
     "name",
     "dimension",
     "softening",
@@ -38,11 +38,11 @@ const TOP: &[&str] = &[
     "rolling",
     "study",
 ];
-const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
-const AGENT: &[&str] =
+pub(super) const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
+pub(super) const AGENT: &[&str] =
     &["name", "start", "goal", "start_velocity", "speed_max", "accel_max", "weight", "jammer", "dropout"];
-const SENSOR: &[&str] = &["name", "position", "track", "ranging", "detection", "jam"];
-const TERM: &[&str] = &["metric", "sense", "reduce", "weight", "agents", "from", "until"];
+pub(super) const SENSOR: &[&str] = &["name", "position", "track", "ranging", "detection", "jam"];
+pub(super) const TERM: &[&str] = &["metric", "sense", "reduce", "weight", "agents", "from", "until"];
 
 impl ScenarioFile {
     /// Reads a scenario file; `-` is standard input.

@@ -31,8 +31,8 @@ pub struct Wind {
     pub gust_time: f64,
 }
 
-const KEYS: &[&str] = &["seed", "sensor_position", "path_loss", "airspeed", "wind"];
-const WIND: &[&str] = &["mean", "deviation", "gust", "gust_time"];
+pub(super) const KEYS: &[&str] = &["seed", "sensor_position", "path_loss", "airspeed", "wind"];
+pub(super) const WIND: &[&str] = &["mean", "deviation", "gust", "gust_time"];
 /// Largest airspeed where the file does not say.
 const AIRSPEED: f64 = 1.25;
 /// How long gusts last where the file does not say, s.
