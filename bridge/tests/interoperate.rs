@@ -27,7 +27,10 @@ fn python() -> &'static Path {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mavlink");
         let python = folder.join("bin/python");
         let has = |python: &Path| {
-            let probe = Command::new(python).args(["-c", "import pymavlink, mavsdk, jsonschema"]).stderr(Stdio::null()).status();
+            let probe = Command::new(python)
+                .args(["-c", "import pymavlink, mavsdk, jsonschema"])
+                .stderr(Stdio::null())
+                .status();
             probe.is_ok_and(|status| status.success())
         };
         if !has(&python) {
@@ -182,7 +185,8 @@ fn jsonschema_finds_our_scenarios_valid_and_spoilt_ones_not() {
         paths.push(folder.path(&name));
     }
     let mut command = Command::new(python());
-    let mut child = command.arg(script("validate.py")).args(&paths).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let mut child =
+        command.arg(script("validate.py")).args(&paths).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
     let child = child.as_mut().expect("Python runs");
     let schema = quietpath_bridge::file::schema::scenario_schema();
     child.stdin.take().expect("a pipe").write_all(schema.as_bytes()).expect("it reads");

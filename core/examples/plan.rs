@@ -28,8 +28,17 @@ fn main() -> Result<(), quietpath_core::Error> {
         domain: Domain { min: Point::zeros(), max: Point::new(10.0, 10.0) },
         agents: &[agent],
         sensors: &[at(3.0, 2.0), at(5.0, 5.5), at(8.0, 4.0)],
-        terms: &[Term { metric: Metric::Detection, sense: Sense::Minimize, reduce: Reduce::Integral, weight: 1.0, agents: AgentSet::ALL, window: Window::always() }],
-        separation: None, regions: &[], limits: &[],
+        terms: &[Term {
+            metric: Metric::Detection,
+            sense: Sense::Minimize,
+            reduce: Reduce::Integral,
+            weight: 1.0,
+            agents: AgentSet::ALL,
+            window: Window::always(),
+        }],
+        separation: None,
+        regions: &[],
+        limits: &[],
     };
     // Sizes: 2 dimensions, 8 sensors, 1 agent, 4 entries of tracks; 41 nodes. All memory is the caller's.
     let scenario: Scenario<f64, 2, 8, 1, 4> = Scenario::new(&draft)?;

@@ -118,14 +118,20 @@ fn time(scenario: &ScenarioFile, advice: &mut Advice) {
         advice.facts.push((format!("{} straight flight", agent.name), value));
         if slack < TIGHT * straight {
             advice.say(
-                format!("{} can hardly leave the straight line: `time.max` leaves {percent:.1} % of slack", agent.name),
+                format!(
+                    "{} can hardly leave the straight line: `time.max` leaves {percent:.1} % of slack",
+                    agent.name
+                ),
                 "a later `time.max` or a larger `speed_max` gives it a choice",
             );
         }
         let late = scenario.start_time + straight - scenario.time.target;
         if scenario.time.penalty > 0.0 && scenario.time.target > 0.0 && late > 0.0 {
             advice.say(
-                format!("{} always pays for being late: `time.target` is {late:.1} s before its earliest arrival", agent.name),
+                format!(
+                    "{} always pays for being late: `time.target` is {late:.1} s before its earliest arrival",
+                    agent.name
+                ),
                 "choose a later `time.target`, or leave it out",
             );
         }
@@ -235,7 +241,12 @@ fn room(scenario: &ScenarioFile, advice: &mut Advice) {
                 let gap = edges.map(|(a, b)| off(flat, *a, *b)).fold(f64::INFINITY, f64::min);
                 if gap < near {
                     advice.say(
-                        format!("the {word} of {} is {} from the outline of {}", agent.name, units::length(gap * unit_m), region.name),
+                        format!(
+                            "the {word} of {} is {} from the outline of {}",
+                            agent.name,
+                            units::length(gap * unit_m),
+                            region.name
+                        ),
                         "a vehicle is blown about: leave it room",
                     );
                 }
@@ -247,15 +258,21 @@ fn room(scenario: &ScenarioFile, advice: &mut Advice) {
 fn grid(scenario: &ScenarioFile, advice: &mut Advice) {
     let unit_m = scenario.frame.unit_m;
     let fastest = scenario.agents.iter().map(|agent| agent.speed_max).fold(0.0, f64::max);
-    let straight = scenario.agents.iter().map(|agent| distance(&agent.start, &agent.goal) / agent.speed_max).fold(0.0, f64::max);
+    let straight =
+        scenario.agents.iter().map(|agent| distance(&agent.start, &agent.goal) / agent.speed_max).fold(0.0, f64::max);
     let step = fastest * straight.max(scenario.time.target - scenario.start_time) / scenario.intervals as f64;
     advice.facts.push(("way in an interval".into(), format!("about {}", units::length(step * unit_m))));
     let places: Vec<&[f64]> = scenario.sensors.iter().map(first_place).collect();
-    let gaps = places.iter().enumerate().flat_map(|(index, a)| places.iter().skip(index + 1).map(move |b| distance(a, b)));
+    let gaps =
+        places.iter().enumerate().flat_map(|(index, a)| places.iter().skip(index + 1).map(move |b| distance(a, b)));
     let gap = gaps.filter(|gap| *gap > 0.0).fold(f64::INFINITY, f64::min);
     if gap.is_finite() && step > gap {
         advice.say(
-            format!("an interval is longer than the way between two sensors: {} against {}", units::length(step * unit_m), units::length(gap * unit_m)),
+            format!(
+                "an interval is longer than the way between two sensors: {} against {}",
+                units::length(step * unit_m),
+                units::length(gap * unit_m)
+            ),
             "what lies between nodes is not seen: raise `grid.intervals`",
         );
     }
@@ -270,7 +287,8 @@ fn first_place(sensor: &SensorEntry) -> &[f64] {
 
 /// Whether location errors are asked for, and whether detection is.
 fn wanted(scenario: &ScenarioFile) -> [bool; 2] {
-    let metrics = || scenario.terms.iter().map(|term| term.metric).chain(scenario.limits.iter().map(|limit| limit.metric));
+    let metrics =
+        || scenario.terms.iter().map(|term| term.metric).chain(scenario.limits.iter().map(|limit| limit.metric));
     [metrics().any(Metric::is_location_error), metrics().any(|metric| !metric.is_location_error())]
 }
 
@@ -302,7 +320,10 @@ fn sensors(scenario: &ScenarioFile, advice: &mut Advice) -> Result<(), Box<FileE
         }
         if highest < FAINT {
             advice.say(
-                format!("{} hardly sees anything: its probability of detection is at most {highest:.1e} in the domain", sensor.name),
+                format!(
+                    "{} hardly sees anything: its probability of detection is at most {highest:.1e} in the domain",
+                    sensor.name
+                ),
                 "look at its `detection` numbers, its place, and `frame.unit_m`",
             );
         }
@@ -316,7 +337,8 @@ fn landscape(scenario: &ScenarioFile, advice: &mut Advice) -> Result<(), Box<Fil
     let mut values: Vec<f64> = planning::landscape(scenario, &at)?.values;
     values.retain(|value| value.is_finite());
     values.sort_by(f64::total_cmp);
-    let at = |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
+    let at =
+        |share: f64| values.get((share * (values.len().max(1) - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
     let (low, high) = (at(0.02), at(0.98));
     let shown = |value: f64| crate::picture::scale::trimmed(value);
     advice.facts.push((format!("{} in the domain", metric.name()), format!("{} to {}", shown(low), shown(high))));
@@ -353,7 +375,11 @@ mod tests {
     #[test]
     fn a_wall_closes_every_way_and_a_gap_opens_it() {
         let wall = |to: f64| {
-            advice(|text| format!("{text}\n[[region]]\nname = \"wall\"\npolygon = [[4.9, -1.0], [5.1, -1.0], [5.1, {to}], [4.9, {to}]]\n"))
+            advice(|text| {
+                format!(
+                    "{text}\n[[region]]\nname = \"wall\"\npolygon = [[4.9, -1.0], [5.1, -1.0], [5.1, {to}], [4.9, {to}]]\n"
+                )
+            })
         };
         assert!(!wall(11.0).reachable && says(&wall(11.0), "cannot reach its goal"));
         assert!(wall(9.5).reachable);
@@ -361,15 +387,21 @@ mod tests {
 
     #[test]
     fn each_oddity_is_named() {
-        let late = advice(|text| text.replace("max = 300.0", "max = 96.5").replace("target = 114.962255", "target = 50.0"));
+        let late =
+            advice(|text| text.replace("max = 300.0", "max = 96.5").replace("target = 114.962255", "target = 50.0"));
         assert!(says(&late, "can hardly leave the straight line") && says(&late, "always pays"), "{late:?}");
         let coarse = advice(|text| text.replace("intervals = 60", "intervals = 3"));
         assert!(says(&coarse, "longer than the way between two sensors"), "{coarse:?}");
         let deaf = advice(|text| text.replace("scale = 0.3, epsilon", "scale = 0.000001, epsilon"));
         assert!(says(&deaf, "s1 hardly sees anything"), "{deaf:?}");
-        let idle = advice(|text| format!("{text}\n[[sensor]]\nname = \"idle\"\nposition = [3.0, 9.0]\nranging = {{ model = \"rss\", scale = 1.0, path_loss = 2.0 }}\n"));
+        let idle = advice(|text| {
+            format!(
+                "{text}\n[[sensor]]\nname = \"idle\"\nposition = [3.0, 9.0]\nranging = {{ model = \"rss\", scale = 1.0, path_loss = 2.0 }}\n"
+            )
+        });
         assert!(says(&idle, "idle does nothing here"), "{idle:?}");
-        let near = advice(|text| format!("{text}\n[[region]]\nname = \"close\"\ncenter = [0.8, 2.05]\nradius = 1.0\n"));
+        let near =
+            advice(|text| format!("{text}\n[[region]]\nname = \"close\"\ncenter = [0.8, 2.05]\nradius = 1.0\n"));
         assert!(says(&near, "from the outline of close"), "{near:?}");
     }
 }

@@ -102,7 +102,8 @@ pub fn margins(scenario: &ScenarioFile, plan: &PlanFile, assessment: &Assessment
 fn own(scenario: &ScenarioFile, entry: &AgentEntry, agent: &AgentPlan, series: &AgentSeries) -> Vec<Margin> {
     let unit_m = scenario.frame.unit_m;
     let most = |values: &[f64]| values.iter().copied().fold(0.0, f64::max) * unit_m;
-    let off = |end: Option<&Vec<f64>>, wanted: &[f64]| end.map_or(f64::INFINITY, |end| distance(end, wanted) * unit_m);
+    let off =
+        |end: Option<&Vec<f64>>, wanted: &[f64]| end.map_or(f64::INFINITY, |end| distance(end, wanted) * unit_m);
     let row = |constraint, what: &str, found, bound, unit| Margin {
         constraint,
         about: format!("{} {what}", agent.name),
@@ -187,8 +188,12 @@ fn distances(scenario: &ScenarioFile, plan: &PlanFile) -> Vec<Margin> {
     let mut rows = Vec::new();
     for (index, one) in plan.agents.iter().enumerate() {
         for other in plan.agents.iter().skip(index + 1) {
-            let relative: Vec<Vec<f64>> =
-                one.path.iter().zip(&other.path).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect()).collect();
+            let relative: Vec<Vec<f64>> = one
+                .path
+                .iter()
+                .zip(&other.path)
+                .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a - b).collect())
+                .collect();
             let least = relative.windows(2).map(nearest_to_origin).fold(f64::INFINITY, f64::min);
             rows.push(Margin {
                 constraint: "separation",
@@ -268,13 +273,10 @@ mod tests {
         let room = |y| clearance(&scenario, &scenario.regions[0], &path(y), &[0.0, 1.0]).room() / unit_m;
         assert!((room(4.5) - 0.5).abs() < 1e-3, "{}", room(4.5));
         assert!((room(3.5) + 0.5).abs() < 0.01, "{}", room(3.5));
-        let inside = AgentPlan {
-            name: "uav1".into(),
-            path: vec![vec![5.0, 3.0], vec![5.5, 3.0]],
-            ..AgentPlan::default()
-        };
+        let inside =
+            AgentPlan { name: "uav1".into(), path: vec![vec![5.0, 3.0], vec![5.5, 3.0]], ..AgentPlan::default() };
         let short = clearance(&scenario, &scenario.regions[0], &inside, &[0.0, 1.0]).room() / unit_m;
-        assert!((short + 0.5).abs() < 1e-3, "{short}");
+        assert!((short + 1.0).abs() < 1e-3, "the start lies in the middle: {short}");
     }
 
     #[test]

@@ -56,7 +56,11 @@ pub fn obstacle(scenario: &ScenarioFile, obstacle: &Obstacle) -> String {
     format!("\n{BAD}no feasible plan{BAD:#}: {found}\n  help: {help}\n")
 }
 
-pub(crate) fn agent_rows(scenario: &ScenarioFile, assessment: &Assessment, agent: &AgentSeries) -> Vec<(&'static str, String)> {
+pub(crate) fn agent_rows(
+    scenario: &ScenarioFile,
+    assessment: &Assessment,
+    agent: &AgentSeries,
+) -> Vec<(&'static str, String)> {
     let mut rows = vec![("path length", units::length(agent.length * scenario.frame.unit_m))];
     if let Some(values) = agent.metric(Metric::Detection) {
         let (peak, node) = extreme(values, f64::max);

@@ -9,7 +9,8 @@ use std::process::{Command, Output, Stdio};
 
 use tempfile::TempDir;
 
-const COMMANDS: [&str; 6] = ["plan", "trade", "landscape", "check", "new", "completions"];
+const COMMANDS: [&str; 11] =
+    ["plan", "trade", "landscape", "check", "report", "study", "merge", "import", "schema", "new", "completions"];
 const METRICS: [&str; 10] =
     ["detection", "false_alarm", "cep2", "cep", "aee", "gdop", "log_cep2", "log_cep", "log_aee", "log_gdop"];
 
@@ -116,6 +117,7 @@ fn without_arguments_the_built_in_scenario_is_planned_into_out() {
         "series.png",
         "series.svg",
         "plan.json",
+        "report.html",
         "path.geojson",
         "mission.plan",
         "mission.waypoints",

@@ -40,7 +40,8 @@ fn what_the_program_writes_comes_back_where_it_was() {
         .map(|path| std::fs::read_to_string(path).unwrap());
     for key in ["start = ", "goal = "] {
         let metres = |text: &str| {
-            let unit_m: f64 = text.lines().find_map(|line| line.strip_prefix("unit_m = ")).unwrap().trim().parse().unwrap();
+            let unit_m: f64 =
+                text.lines().find_map(|line| line.strip_prefix("unit_m = ")).unwrap().trim().parse().unwrap();
             list(text, key).iter().map(|part| part * unit_m).collect::<Vec<_>>()
         };
         for (a, b) in metres(&was).iter().zip(metres(&is)) {

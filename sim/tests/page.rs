@@ -62,14 +62,15 @@ const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   seen.paper = getComputedStyle(document.body).backgroundColor;
   for (const part of [seen.before, seen.after, seen.hovered]) part.picture = [...part.picture].reduce((sum, letter) => (31 * sum + letter.charCodeAt(0)) | 0, 0);
   seen.problems = problems;
-  document.documentElement.setAttribute('data-seen', encodeURIComponent(JSON.stringify(seen)));
+  top.document.documentElement.setAttribute('data-seen', encodeURIComponent(JSON.stringify(seen)));
 })();
 </script>";
 
 /// How the browser is held.
 #[derive(Clone, Copy)]
 struct Screen {
-    size: &'static str,
+    /// Width and height of the page. Windows of the browser are no narrower than 500: a phone is a frame in one.
+    size: [u32; 2],
     dark: bool,
 }
 
@@ -79,14 +80,27 @@ fn visit(folder: &Path, page: &str, screen: Screen) -> Value {
     let text = text.replacen("<head>", &format!("<head>{WATCH}"), 1);
     let end = text.rfind("</body>").unwrap();
     let probed = folder.join("probed.html");
-    std::fs::write(&probed, format!("{}{PROBE}{}", &text[..end], &text[end..])).unwrap();
+    let text = format!("{}{PROBE}{}", &text[..end], &text[end..]);
+    let [width, height] = screen.size;
+    let framed = text.replace('&', "&amp;").replace('"', "&quot;");
+    let frame = format!(
+        "<!doctype html><iframe width={width} height={height} style=\"border:0\" srcdoc=\"{framed}\"></iframe>"
+    );
+    std::fs::write(&probed, if width < 500 { frame } else { text }).unwrap();
     let mut command = Command::new("chromium");
     command
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"])
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--hide-scrollbars",
+        ])
         .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
         .args(["--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.join("browser").display()))
-        .arg(format!("--window-size={}", screen.size));
+        .arg(format!("--window-size={},{}", width.max(500), height));
     if screen.dark {
         command.arg("--blink-settings=preferredColorScheme=0");
     }
@@ -121,7 +135,8 @@ fn planned(name: &str) -> TempDir {
     let room = TempDir::new().unwrap();
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{name}.toml"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_quietpath"));
-    let status = command.current_dir(&room).arg("plan").arg(scenario).args(["--once", "--out", "."]).status().unwrap();
+    let status =
+        command.current_dir(&room).arg("plan").arg(scenario).args(["--once", "--out", "."]).status().unwrap();
     assert!(status.success());
     room
 }
@@ -130,12 +145,18 @@ fn planned(name: &str) -> TempDir {
 #[ignore = "needs chromium"]
 fn the_slider_moves_sensors_vehicles_and_diagrams() {
     let room = planned("wight-jam");
-    let seen = visit(room.path(), "report.html", Screen { size: "1280,900", dark: false });
+    let seen = visit(room.path(), "report.html", Screen { size: [1280, 900], dark: false });
     let (before, after) = (&seen["before"], &seen["after"]);
     for who in ["uav1", "s1"] {
         assert!(before["rows"][who].is_array(), "{}", before["rows"]);
     }
-    let moved: Vec<&String> = before["rows"].as_object().unwrap().iter().filter(|(who, at)| after["rows"][*who] != **at).map(|(who, _)| who).collect();
+    let moved: Vec<&String> = before["rows"]
+        .as_object()
+        .unwrap()
+        .iter()
+        .filter(|(who, at)| after["rows"][*who] != **at)
+        .map(|(who, _)| who)
+        .collect();
     assert!(moved.iter().any(|who| who.starts_with("uav")) && moved.len() > 1, "moved: {moved:?}");
     for what in ["picture", "values", "now"] {
         assert_ne!(before[what], after[what], "{what}");
@@ -152,7 +173,7 @@ fn the_slider_moves_sensors_vehicles_and_diagrams() {
 #[ignore = "needs chromium"]
 fn every_metric_has_a_landscape_and_every_table_rows() {
     let room = planned("square8-energy");
-    let seen = visit(room.path(), "report.html", Screen { size: "1280,900", dark: false });
+    let seen = visit(room.path(), "report.html", Screen { size: [1280, 900], dark: false });
     assert_eq!(seen["metrics"].as_array().unwrap().len(), 10, "{}", seen["metrics"]);
     for landscape in seen["landscapes"].as_array().unwrap() {
         let (label, ticks) = landscape.as_str().unwrap().rsplit_once(':').expect("a landscape");
@@ -168,10 +189,10 @@ fn every_metric_has_a_landscape_and_every_table_rows() {
 #[ignore = "needs chromium"]
 fn a_phone_in_the_dark_shows_all_of_it() {
     let room = planned("square8-team");
-    let seen = visit(room.path(), "report.html", Screen { size: "390,844", dark: true });
+    let seen = visit(room.path(), "report.html", Screen { size: [390, 844], dark: true });
     assert_eq!((&seen["width"], &seen["wide"]), (&390.into(), &390.into()));
     assert_eq!(seen["dark"], true);
     assert_eq!(seen["paper"], "rgb(20, 23, 26)");
-    let light = visit(room.path(), "report.html", Screen { size: "390,844", dark: false });
+    let light = visit(room.path(), "report.html", Screen { size: [390, 844], dark: false });
     assert_eq!(light["paper"], "rgb(255, 255, 255)");
 }

@@ -63,7 +63,8 @@ fn a_study_that_is_killed_goes_on_and_ends_as_if_it_had_not_been() {
     let args = ["study", "s.toml", "--plan", "plan.json", "--runs", "600", "--out"];
     let whole = good(&room, &[&args[..], &["whole"]].concat());
     let file = room.path().join("cut/runs.jsonl");
-    let child = command(&room, &[&args[..], &["cut"]].concat()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let child =
+        command(&room, &[&args[..], &["cut"]].concat()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let before = killed(child, &file);
     assert!((1..600).contains(&before), "{before} runs before the end: nothing is tested");
     let kept = content(&file);
@@ -111,7 +112,10 @@ fn what_is_wrong_is_said() {
     says(&["merge", "s.toml"], "s.toml:1: is no line of a study");
     good(&room, &["study", "s.toml", "--plan", "plan.json", "--runs", "3", "--out", "a"]);
     std::fs::write(room.path().join("s.toml"), SCENARIO.replace("path_loss = 0.05", "path_loss = 0.06")).unwrap();
-    says(&["study", "s.toml", "--plan", "plan.json", "--runs", "3", "--out", "a"], "holds runs of another scenario file");
+    says(
+        &["study", "s.toml", "--plan", "plan.json", "--runs", "3", "--out", "a"],
+        "holds runs of another scenario file",
+    );
     let negative = SCENARIO.replace("sensor_position = 0.2", "sensor_position = -0.2");
     std::fs::write(room.path().join("s.toml"), negative).unwrap();
     says(&["study", "s.toml"], "study.sensor_position must not be negative, but is -0.2");

@@ -31,7 +31,11 @@ fn every_command_of_the_tour_runs() {
         let words: Vec<&str> = command.split_whitespace().collect();
         let [program, arguments @ ..] = words.as_slice() else { panic!("{command}") };
         if *program == "cargo" {
-            assert_eq!(arguments, ["install", "--path", "sim"], "what cannot be walked here must be known: {command}");
+            assert_eq!(
+                arguments,
+                ["install", "--path", "sim"],
+                "what cannot be walked here must be known: {command}"
+            );
             continue;
         }
         assert_eq!(*program, "quietpath", "{command}");

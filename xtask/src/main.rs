@@ -152,7 +152,8 @@ fn pictures() -> Vec<Step> {
 /// The report in headless Chromium, into a picture.
 fn screen(name: &'static str, size: &str, instant: &str, dark: bool) -> Step {
     let top = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/pictures");
-    let scheme = if dark { "--blink-settings=preferredColorScheme=0" } else { "--blink-settings=preferredColorScheme=1" };
+    let scheme =
+        if dark { "--blink-settings=preferredColorScheme=0" } else { "--blink-settings=preferredColorScheme=1" };
     let options = "--headless --no-sandbox --disable-gpu --no-first-run --hide-scrollbars --virtual-time-budget=8000";
     let quiet = "--disable-quic --disable-background-networking --disable-component-update --disable-sync";
     let files = format!("--user-data-dir={top}/browser --screenshot={top}/{name}.png --window-size={size}");

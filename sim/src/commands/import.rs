@@ -42,7 +42,9 @@ pub fn run(args: &ImportArgs) -> Result<Verdict, Failure> {
         words.push_str(&format!("to be put right before it can be planned: {cause}\n"));
     }
     if !to_stdout {
-        words.push_str(&format!("wrote {shown}\nnext: look at the lines marked `assumed`, then quietpath check {shown}\n"));
+        words.push_str(&format!(
+            "wrote {shown}\nnext: look at the lines marked `assumed`, then quietpath check {shown}\n"
+        ));
     }
     say(Stream::Err, &words)?;
     Ok(Verdict::Done)

@@ -22,8 +22,8 @@ use quietpath_core::scenario::Metric;
 use super::{landscape, load};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
-use crate::page::{self, Story, Way};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
+use crate::page::{self, Story, Way};
 use crate::report;
 
 /// The scenario that is planned when nothing is asked.

@@ -47,10 +47,13 @@ pub fn run(args: &StudyArgs) -> Result<Verdict, Failure> {
     let mut planned = figures(&scenario, &paper);
     planned.flight_time = Some(plan.duration);
     let heading = Heading::of(&scenario, &plan, planned);
-    let file = args.shard.map_or_else(|| "runs.jsonl".to_owned(), |Shard { index, count }| format!("runs-{index}-of-{count}.jsonl"));
+    let file = args
+        .shard
+        .map_or_else(|| "runs.jsonl".to_owned(), |Shard { index, count }| format!("runs-{index}-of-{count}.jsonl"));
     let (mut record, mut runs) = Record::open(&args.out.join(&file), &heading)?;
     write_whole(&args.out.join("plan.json"), plan.to_json().as_bytes())?;
-    let mine = |run: &u64| args.shard.is_none_or(|Shard { index, count }| run % u64::from(count) == u64::from(index) - 1);
+    let mine =
+        |run: &u64| args.shard.is_none_or(|Shard { index, count }| run % u64::from(count) == u64::from(index) - 1);
     runs.retain(|run, _| *run < args.runs && mine(run));
     let missing: Vec<u64> = (0..args.runs).filter(mine).filter(|run| !runs.contains_key(run)).collect();
     if !runs.is_empty() {
@@ -60,7 +63,10 @@ pub fn run(args: &StudyArgs) -> Result<Verdict, Failure> {
     fly(&stage, &missing, &mut record, &mut runs)?;
     if args.shard.is_some() {
         let help = "quietpath merge --out MERGED DIR/runs-*.jsonl";
-        say(Stream::Out, &format!("{} runs in {}\nwhen all shards are there: {help}\n", runs.len(), args.out.join(file).display()))?;
+        say(
+            Stream::Out,
+            &format!("{} runs in {}\nwhen all shards are there: {help}\n", runs.len(), args.out.join(file).display()),
+        )?;
         return Ok(Verdict::Done);
     }
     finish(&heading, &runs, &args.out)
@@ -114,7 +120,12 @@ fn plan(scenario: &ScenarioFile, args: &StudyArgs) -> Result<PlanFile, Failure> 
 }
 
 /// Flies runs on every core; each is on disk before the next figure of progress.
-fn fly(stage: &Stage<'_>, missing: &[u64], record: &mut Record, runs: &mut BTreeMap<u64, Run>) -> Result<(), Failure> {
+fn fly(
+    stage: &Stage<'_>,
+    missing: &[u64],
+    record: &mut Record,
+    runs: &mut BTreeMap<u64, Run>,
+) -> Result<(), Failure> {
     let bar = counting_bar("flying", missing.len() as u64);
     let next = AtomicUsize::new(0);
     let cores = std::thread::available_parallelism().map_or(1, usize::from).min(missing.len().max(1));

@@ -22,7 +22,8 @@ pub fn fitted(corners: &[[f64; 2]]) -> Option<Fit> {
     }
     if hull.len() > VERTICES_MAX {
         let share = 1.0 / hull.len() as f64;
-        let center = hull.iter().fold([0.0, 0.0], |sum, corner| [sum[0] + share * corner[0], sum[1] + share * corner[1]]);
+        let center =
+            hull.iter().fold([0.0, 0.0], |sum, corner| [sum[0] + share * corner[0], sum[1] + share * corner[1]]);
         let reach = |corner: &[f64; 2]| (corner[0] - center[0]).hypot(corner[1] - center[1]);
         return Some(Fit::Circle(center, hull.iter().map(reach).fold(0.0, f64::max)));
     }
@@ -68,7 +69,8 @@ mod tests {
 
     #[test]
     fn many_corners_become_the_circle_around_them() {
-        let ring: Vec<[f64; 2]> = (0..40).map(|k| f64::from(k) * 0.157).map(|a| [3.0 * a.cos(), 3.0 * a.sin()]).collect();
+        let ring: Vec<[f64; 2]> =
+            (0..40).map(|k| f64::from(k) * 0.157).map(|a| [3.0 * a.cos(), 3.0 * a.sin()]).collect();
         let Some(Fit::Circle(center, radius)) = fitted(&ring) else { panic!("{:?}", fitted(&ring)) };
         assert!(ring.iter().all(|corner| (corner[0] - center[0]).hypot(corner[1] - center[1]) <= radius));
         assert!(radius < 3.1, "{radius}");

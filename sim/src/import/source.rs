@@ -23,7 +23,8 @@ pub fn qgc_plan(text: &str, found: &mut Found) -> Result<(), String> {
     found.speed_m_s = mission["cruiseSpeed"].as_f64().filter(|speed| *speed > 0.0).or(found.speed_m_s);
     for item in mission["items"].as_array().into_iter().flatten() {
         let flown = item["command"].as_u64().is_some_and(|command| PLACES.contains(&command));
-        let place = item["params"].as_array().and_then(|params| Some([params.get(4)?.as_f64()?, params.get(5)?.as_f64()?]));
+        let place =
+            item["params"].as_array().and_then(|params| Some([params.get(4)?.as_f64()?, params.get(5)?.as_f64()?]));
         if let Some(place) = place.filter(|[latitude, longitude]| flown && (*latitude != 0.0 || *longitude != 0.0)) {
             found.height_m = found.height_m.or_else(|| item["params"][6].as_f64().filter(|height| *height > 0.0));
             found.waypoints.push(Spot::Earth(place));
@@ -31,7 +32,8 @@ pub fn qgc_plan(text: &str, found: &mut Found) -> Result<(), String> {
     }
     let fence = &plan["geoFence"];
     for (index, polygon) in fence["polygons"].as_array().into_iter().flatten().enumerate() {
-        let corners: Option<Vec<Spot>> = polygon["polygon"].as_array().map(|all| all.iter().filter_map(pair).map(Spot::Earth).collect());
+        let corners: Option<Vec<Spot>> =
+            polygon["polygon"].as_array().map(|all| all.iter().filter_map(pair).map(Spot::Earth).collect());
         let outline = Shape::Polygon(corners.unwrap_or_default());
         found.areas.push(Area { name: format!("fence{}", index + 1), inside: polygon["inclusion"] == true, outline });
     }
@@ -102,7 +104,9 @@ fn shape(value: &GeometryValue, name: &str, inside: bool, found: &mut Found) {
             geometries.iter().for_each(|part| shape(&part.value, name, inside, found));
         }
         GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
-            found.notes.push(format!("a line{} was left out: only points and polygons mean something here", named(name)));
+            found
+                .notes
+                .push(format!("a line{} was left out: only points and polygons mean something here", named(name)));
         }
     }
 }
@@ -157,7 +161,9 @@ fn placed(geometry: &Geometry, name: &str, found: &mut Found) {
             area(found, name, false, corners);
         }
         Geometry::MultiGeometry(all) => all.geometries.iter().for_each(|part| placed(part, name, found)),
-        _ => found.notes.push(format!("a line{} was left out: only points and polygons mean something here", named(name))),
+        _ => found
+            .notes
+            .push(format!("a line{} was left out: only points and polygons mean something here", named(name))),
     }
 }
 
@@ -165,8 +171,10 @@ fn placed(geometry: &Geometry, name: &str, found: &mut Found) {
 pub fn csv(text: &str, found: &mut Found) -> Result<(), String> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let headings = reader.headers().map_err(|cause| format!("is not valid CSV: {cause}"))?.clone();
-    let column = |names: &[&str]| headings.iter().position(|heading| names.contains(&heading.to_lowercase().as_str()));
-    let earth = column(&["latitude", "lat", "latitude_deg"]).zip(column(&["longitude", "lon", "lng", "longitude_deg"]));
+    let column =
+        |names: &[&str]| headings.iter().position(|heading| names.contains(&heading.to_lowercase().as_str()));
+    let earth =
+        column(&["latitude", "lat", "latitude_deg"]).zip(column(&["longitude", "lon", "lng", "longitude_deg"]));
     let plane = column(&["east_m", "east", "x"]).zip(column(&["north_m", "north", "y"]));
     let (columns, is_earth) = match (earth, plane) {
         (Some(columns), _) => (columns, true),

@@ -36,9 +36,9 @@ pub fn scenario(found: &mut Found, name: &str, from: &str) -> Result<String, Fai
     let frame = origin.map(|origin| LocalFrame::new(origin, 1.0));
     let place = |spot: Spot| {
         let help = "give a .plan as well, whose home is then the origin";
-        flat(frame.as_ref(), spot)
-            .map(|place| place.map(|part| part / UNIT_M))
-            .ok_or_else(|| Failure::Input(format!("some places are on the Earth and others in metres\n  help: {help}")))
+        flat(frame.as_ref(), spot).map(|place| place.map(|part| part / UNIT_M)).ok_or_else(|| {
+            Failure::Input(format!("some places are on the Earth and others in metres\n  help: {help}"))
+        })
     };
     let mut sensors = Vec::new();
     for (name, spot) in &found.sensors {
@@ -61,9 +61,14 @@ pub fn scenario(found: &mut Found, name: &str, from: &str) -> Result<String, Fai
         };
         regions.extend(outline.map(|outline| (area.name, area.inside, outline)));
     }
-    let all: Vec<[f64; 2]> =
-        sensors.iter().map(|(_, at)| *at).chain(ways.iter().copied()).chain(regions.iter().flat_map(|(_, _, fit)| extent(fit))).collect();
-    let [low, high] = domain(&all).ok_or_else(|| Failure::input("everything is in one place: there is no area to plan in"))?;
+    let all: Vec<[f64; 2]> = sensors
+        .iter()
+        .map(|(_, at)| *at)
+        .chain(ways.iter().copied())
+        .chain(regions.iter().flat_map(|(_, _, fit)| extent(fit)))
+        .collect();
+    let [low, high] =
+        domain(&all).ok_or_else(|| Failure::input("everything is in one place: there is no area to plan in"))?;
     let ends = match (ways.first(), ways.last()) {
         (Some(start), Some(goal)) if start != goal => Some([*start, *goal]),
         _ => None,
@@ -99,7 +104,8 @@ fn origin(found: &Found) -> Option<Origin> {
         Shape::Polygon(corners) => corners.clone(),
     });
     let spots = found.sensors.iter().map(|(_, spot)| *spot).chain(found.waypoints.iter().copied()).chain(corners);
-    let places: Vec<[f64; 2]> = spots.filter_map(|spot| if let Spot::Earth(place) = spot { Some(place) } else { None }).collect();
+    let places: Vec<[f64; 2]> =
+        spots.filter_map(|spot| if let Spot::Earth(place) = spot { Some(place) } else { None }).collect();
     let mean = |axis: usize| places.iter().map(|place| place[axis]).sum::<f64>() / places.len() as f64;
     let rounded = |degrees: f64| (degrees * 1e7).round() / 1e7;
     let middle = (!places.is_empty()).then(|| [rounded(mean(0)), rounded(mean(1))]);
@@ -130,18 +136,29 @@ fn domain(all: &[[f64; 2]]) -> Option<[[f64; 2]; 2]> {
     let edge = |axis: usize, pick: fn(f64, f64) -> f64| all.iter().map(|place| place[axis]).reduce(pick);
     let (low, high) = ([edge(0, f64::min)?, edge(1, f64::min)?], [edge(0, f64::max)?, edge(1, f64::max)?]);
     let side = (high[0] - low[0]).max(high[1] - low[1]);
-    (side > 0.0).then(|| [low.map(|at| ((at - ROOM * side) * 100.0).floor() / 100.0), high.map(|at| ((at + ROOM * side) * 100.0).ceil() / 100.0)])
+    (side > 0.0).then(|| {
+        [
+            low.map(|at| ((at - ROOM * side) * 100.0).floor() / 100.0),
+            high.map(|at| ((at + ROOM * side) * 100.0).ceil() / 100.0),
+        ]
+    })
 }
 
 fn heading(found: &Found, name: &str, from: &str, origin: Option<Origin>) -> String {
-    let mut text = format!("# Imported from {from} by quietpath import.\n# Lines marked `assumed` stood in none of these files: put in what is true.\n");
+    let mut text = format!(
+        "# Imported from {from} by quietpath import.\n# Lines marked `assumed` stood in none of these files: put in what is true.\n"
+    );
     for note in &found.notes {
         let _ = writeln!(text, "# Note: {note}.");
     }
-    let _ = writeln!(text, "\nname = {}\ndimension = 2\nsoftening = 0.05\n\n[frame]\nunit_m = {UNIT_M:.1}", quoted(name));
+    let _ =
+        writeln!(text, "\nname = {}\ndimension = 2\nsoftening = 0.05\n\n[frame]\nunit_m = {UNIT_M:.1}", quoted(name));
     if let Some(Origin { latitude_deg, longitude_deg, altitude_m }) = origin {
         let assumed = if found.height_m.is_none() { "    # assumed: height of the flight above home" } else { "" };
-        let _ = writeln!(text, "latitude_deg = {latitude_deg:?}\nlongitude_deg = {longitude_deg:?}\naltitude_m = {altitude_m:?}{assumed}");
+        let _ = writeln!(
+            text,
+            "latitude_deg = {latitude_deg:?}\nlongitude_deg = {longitude_deg:?}\naltitude_m = {altitude_m:?}{assumed}"
+        );
     }
     text
 }

@@ -118,3 +118,25 @@ window.addEventListener('afterprint', () => {
 // `report.html#t=120` opens at an instant, in seconds.
 const asked = Number(new URLSearchParams(location.hash.slice(1)).get('t') ?? NaN);
 moment.set(Number.isFinite(asked) ? asked : data.time[0]);
+
+// Live: every event is all that is known. Who looks at the newest instant stays there.
+const live = get('data').dataset.live;
+if (live) {
+  moment.set(data.time[1]);
+  const source = new EventSource(live);
+  source.addEventListener('message', (event) => {
+    const isNewest = moment.time >= data.time[1];
+    Object.assign(data, JSON.parse(event.data));
+    get('subtitle').textContent = data.subtitle;
+    tables(data);
+    legend(data);
+    map.reload();
+    charts.reload();
+    choose(Number(get('metric').value));
+    queueMicrotask(() => moment.set(isNewest ? data.time[1] : moment.time));
+  });
+  source.addEventListener('error', () => {
+    get('subtitle').textContent = `${data.subtitle}; the flight is over, or its program has ended`;
+    source.close();
+  });
+}

@@ -3,18 +3,27 @@
 class Charts {
   constructor(data, element, moment) {
     Object.assign(this, { data, element, moment, plots: [] });
-    this.figures = data.panels.map((panel) => {
+    this.build();
+  }
+
+  frames() {
+    return this.data.panels.map((panel) => {
       const box = document.createElement('figure');
       const caption = document.createElement('figcaption');
       caption.textContent = panel.unit ? `${panel.title} (${panel.unit})` : panel.title;
       box.append(caption);
-      element.append(box);
+      this.element.append(box);
       return box;
     });
-    this.build();
+  }
+
+  /** Takes over new data. */
+  reload() {
+    this.restyle();
   }
 
   build() {
+    this.figures = this.frames();
     this.plots = this.data.panels.map((panel, index) => this.plot(panel, this.figures[index]));
     this.updateSoon();
   }
@@ -86,6 +95,7 @@ class Charts {
 
   restyle() {
     this.plots.forEach((plot) => plot.destroy());
+    this.element.replaceChildren();
     this.build();
   }
 }

@@ -204,7 +204,9 @@ pub fn gather(scenario: &ScenarioFile, story: &Story<'_>) -> Result<Data, Box<Fi
         clock: time_unit(time[1] - time[0]),
         map: map(scenario),
         fields: field::fields(scenario, time)?,
-        agents: agents.map(|(index, agent)| Agent { name: agent.name.clone(), colour: colour::agent(index) }).collect(),
+        agents: agents
+            .map(|(index, agent)| Agent { name: agent.name.clone(), colour: colour::agent(index) })
+            .collect(),
         paths: paths(story, scale),
         panels: panels.iter().map(diagram).collect(),
         figures: figures(scenario, story),
@@ -315,7 +317,9 @@ fn figures(scenario: &ScenarioFile, story: &Story<'_>) -> Vec<Row> {
         let name = |label: &str| {
             if assessment.agents.len() > 1 { format!("{}: {label}", agent.name) } else { label.to_owned() }
         };
-        rows.extend(report::agent_rows(scenario, assessment, agent).into_iter().map(|(label, value)| (name(label), value)));
+        rows.extend(
+            report::agent_rows(scenario, assessment, agent).into_iter().map(|(label, value)| (name(label), value)),
+        );
     }
     rows
 }

@@ -98,7 +98,8 @@ pub fn fields(scenario: &ScenarioFile, [from, until]: [f64; 2]) -> Result<Fields
         }
         metrics.push(field);
     }
-    let height = first.first().and_then(|grid| grid.height).map(|up| crate::units::length(up * scenario.frame.unit_m));
+    let height =
+        first.first().and_then(|grid| grid.height).map(|up| crate::units::length(up * scenario.frame.unit_m));
     Ok(Fields { columns: at.columns, rows: at.rows, times, height, metrics })
 }
 

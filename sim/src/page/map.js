@@ -371,6 +371,12 @@ class FlightMap {
     this.plot.setData(this.plot.data);
   }
 
+  /** Takes over new data. */
+  reload() {
+    this.loudest = loudest(this.data);
+    this.landscape = new Landscape(this.data.fields, this.data.map.colours);
+  }
+
   choose(metric) {
     this.metric = metric;
     this.update();

@@ -32,16 +32,35 @@ const PROGRAM: [&str; 4] =
 /// # Errors
 /// As [`quietpath_bridge::planning::landscapes`].
 pub fn html(scenario: &ScenarioFile, story: &Story<'_>) -> Result<String, Box<FileError>> {
+    Ok(assembled(&scenario.name, &json(scenario, story)?, ""))
+}
+
+/// The data of a story, as JSON.
+///
+/// # Errors
+/// As [`html`].
+pub fn json(scenario: &ScenarioFile, story: &Story<'_>) -> Result<String, Box<FileError>> {
     let data = data::gather(scenario, story)?;
-    let json = serde_json::to_string(&data).unwrap_or_else(|_| "null".into());
-    Ok(fill(&[
-        ("title", &escaped(&scenario.name)),
+    Ok(serde_json::to_string(&data).unwrap_or_else(|_| "null".into()))
+}
+
+/// The page for a server that has `/events`: it may connect to where it comes from, and nowhere else.
+#[must_use]
+pub fn live(title: &str, json: &str) -> String {
+    assembled(title, json, "connect-src 'self'; ")
+}
+
+fn assembled(title: &str, json: &str, policy: &str) -> String {
+    fill(&[
+        ("title", &escaped(title)),
+        ("policy", policy),
+        ("live", if policy.is_empty() { "" } else { " data-live=\"/events\"" }),
         ("style", &STYLE.concat()),
         // A script element ends at the first `</script`, whatever stands around it.
         ("data", &json.replace('<', "\\u003c")),
         ("library", LIBRARY),
         ("program", &PROGRAM.concat()),
-    ]))
+    ])
 }
 
 /// The structure with its `{{name}}` places filled, each once.

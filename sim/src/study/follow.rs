@@ -133,8 +133,7 @@ fn advance(x: &mut [f64], v: &mut [f64], wanted: &[f64], limits: Limits, wind: [
     let through: Vec<f64> = wanted.iter().enumerate().map(|(axis, u)| u - wind(axis)).collect();
     let slower = (limits.airspeed / norm(&through).max(f64::MIN_POSITIVE)).min(1.0);
     let had = v.iter().enumerate();
-    let pull: Vec<f64> =
-        had.zip(&through).map(|((axis, v), u)| (wind(axis) + slower * u - v) / VELOCITY_S).collect();
+    let pull: Vec<f64> = had.zip(&through).map(|((axis, v), u)| (wind(axis) + slower * u - v) / VELOCITY_S).collect();
     let weaker = (limits.accel / norm(&pull).max(f64::MIN_POSITIVE)).min(1.0);
     for ((x, v), pull) in x.iter_mut().zip(v).zip(pull) {
         *v += weaker * pull * step;

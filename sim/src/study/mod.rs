@@ -256,7 +256,8 @@ mod tests {
     fn straight(scenario: &ScenarioFile) -> PlanFile {
         let (start, goal) = (&scenario.agents[0].start, &scenario.agents[0].goal);
         let node = |node: u32| start.iter().zip(goal).map(|(a, b)| a + (b - a) * f64::from(node) / 60.0).collect();
-        let agents = vec![AgentPlan { name: "uav1".into(), path: (0..=60).map(node).collect(), ..AgentPlan::default() }];
+        let agents =
+            vec![AgentPlan { name: "uav1".into(), path: (0..=60).map(node).collect(), ..AgentPlan::default() }];
         PlanFile { duration: 120.0, agents, ..PlanFile::default() }
     }
 

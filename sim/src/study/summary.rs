@@ -25,7 +25,12 @@ struct Figure {
 const FIGURES: [Figure; 5] = [
     Figure { key: "peak_detection", name: "peak detection", unit: "", of: |figures| figures.peak_detection },
     Figure { key: "mean_detection", name: "mean detection", unit: "", of: |figures| figures.mean_detection },
-    Figure { key: "least_cep_m", name: "smallest location error (CEP)", unit: "m", of: |figures| figures.least_cep_m },
+    Figure {
+        key: "least_cep_m",
+        name: "smallest location error (CEP)",
+        unit: "m",
+        of: |figures| figures.least_cep_m,
+    },
     Figure { key: "mean_cep_m", name: "mean location error (CEP)", unit: "m", of: |figures| figures.mean_cep_m },
     Figure { key: "flight_time_s", name: "flight time", unit: "s", of: |figures| figures.flight_time },
 ];
@@ -140,7 +145,8 @@ impl Summary {
             let _ = write!(text, " {column:>10}");
         }
         for spread in self.spreads() {
-            let label = if spread.unit.is_empty() { spread.name.into() } else { format!("{}, {}", spread.name, spread.unit) };
+            let label =
+                if spread.unit.is_empty() { spread.name.into() } else { format!("{}, {}", spread.name, spread.unit) };
             let planned = spread.planned.map_or_else(|| "-".to_owned(), short);
             let _ = write!(text, "\n{label:<34} {planned:>10} {:>10}", short(spread.mean));
             for value in spread.quantiles {
@@ -162,7 +168,8 @@ impl Summary {
             quantiles: spread.quantiles,
         };
         let failures: Vec<String> = self.failures.iter().map(|(name, count)| format!("{name} {count}")).collect();
-        let failed = if failures.is_empty() { "no failures".into() } else { format!("failures: {}", failures.join(", ")) };
+        let failed =
+            if failures.is_empty() { "no failures".into() } else { format!("failures: {}", failures.join(", ")) };
         distribution::draw(&Sheet {
             title: format!("{}: {} flights", self.heading.study, self.runs),
             subtitle: failed,
@@ -175,7 +182,11 @@ impl Summary {
 fn short(value: f64) -> String {
     let digits = 4 - (value.abs().max(1e-300).log10().floor() as i32 + 1);
     let rounded = 10_f64.powi(digits);
-    if value.abs() < 1e-3 || value.abs() >= 1e6 { trimmed(value) } else { trimmed((value * rounded).round() / rounded) }
+    if value.abs() < 1e-3 || value.abs() >= 1e6 {
+        trimmed(value)
+    } else {
+        trimmed((value * rounded).round() / rounded)
+    }
 }
 
 #[cfg(test)]

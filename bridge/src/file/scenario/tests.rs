@@ -469,7 +469,8 @@ fn regions_of_every_kind_reach_the_core() {
 /// The properties of an object in a JSON Schema, its references followed.
 fn properties<'a>(schema: &'a serde_json::Value, of: &'a serde_json::Value) -> Vec<&'a str> {
     let target = of["$ref"].as_str().and_then(|path| schema.pointer(path.trim_start_matches('#'))).unwrap_or(of);
-    let mut names: Vec<&str> = target["properties"].as_object().expect("an object").keys().map(String::as_str).collect();
+    let mut names: Vec<&str> =
+        target["properties"].as_object().expect("an object").keys().map(String::as_str).collect();
     names.sort_unstable();
     names
 }
