@@ -3,9 +3,11 @@
 //! | module | what |
 //! |---|---|
 //! | [`advice`] | what is odd about a scenario, before it is planned |
+//! | [`autopilot`] | a simulated autopilot |
 //! | [`cli`] | the command line: arguments and their explanations |
 //! | [`commands`] | what each command does |
 //! | [`outcome`] | exit statuses, error messages, standard streams, progress |
+//! | [`rehearsal`] | a whole flight in one process: bridge, autopilot, wires, one clock |
 //! | [`report`] | the summaries and tables that commands print |
 //! | [`import`](mod@import) | scenarios from the files of others |
 //! | [`margins`] | how much room a plan leaves to every constraint |
@@ -17,6 +19,7 @@
 //! | [`units`] | from the scenario's units to the ones that people read |
 
 pub mod advice;
+pub mod autopilot;
 pub mod cli;
 pub mod commands;
 pub mod illustrate;
@@ -25,6 +28,7 @@ pub mod margins;
 pub mod outcome;
 pub mod page;
 pub mod picture;
+pub mod rehearsal;
 pub mod report;
 pub mod study;
 pub mod trade;

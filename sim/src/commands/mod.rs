@@ -1,5 +1,6 @@
 //! What each command does.
 
+pub mod autopilot;
 pub mod check;
 pub mod completions;
 pub mod import;
@@ -8,6 +9,7 @@ pub mod new;
 pub mod plan;
 pub mod report;
 pub mod schema;
+pub mod steps;
 pub mod study;
 pub mod trade;
 
@@ -33,6 +35,7 @@ pub fn run(cli: Cli) -> Result<Verdict, Failure> {
         Some(Command::Import(args)) => import::run(&args),
         Some(Command::Schema) => schema::run(),
         Some(Command::New(args)) => new::run(&args),
+        Some(Command::Autopilot(args)) => autopilot::run(&args),
         Some(Command::Completions(args)) => completions::run(&args),
     }
 }

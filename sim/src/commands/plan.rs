@@ -9,17 +9,20 @@
 //! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
 //! | `path.geojson` | for maps; with latitude and longitude only |
 //!
+//! A scenario with `[rolling]` is planned in steps; all files above are then those of the plan that was flown, and beside
+//! them stands what [`super::steps`] writes. With `--once` it is planned in one piece.
+//!
 //! A plan that is not feasible is drawn and written for people to look at, but not as a mission or map.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use quietpath_bridge::file::mission::{file_name, missions};
-use quietpath_bridge::file::{ScenarioFile, geojson};
-use quietpath_bridge::planning::{self, Options, Planned, Precision, Rollout};
+use quietpath_bridge::file::{PlanFile, ScenarioFile, geojson};
+use quietpath_bridge::planning::{self, Assessment, Obstacle, Options, Planned, Precision, Rollout, Step};
 use quietpath_core::scenario::Metric;
 
-use super::{landscape, load};
+use super::{landscape, load, steps};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
@@ -36,7 +39,7 @@ const CELLS: usize = 240;
 /// Plans a scenario file.
 ///
 /// # Errors
-/// Bad input, a scenario that this version does not plan, files that cannot be written.
+/// Bad input, files that cannot be written.
 pub fn run(args: &PlanArgs) -> Result<Verdict, Failure> {
     let scenario = load(&args.scenario)?;
     carry_out(&scenario, args)
@@ -67,27 +70,46 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
             .map_err(|cause| Failure::Input(format!("cannot make the folder {}: {cause}", folder.display())))?;
     }
     let metric = background(scenario, args.metric)?;
-    let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
-    let Planned { plan, assessment, obstacle, .. } = planned;
+    let made = make(scenario, args)?;
     let json_to_stdout = args.plan.as_deref() == Some(Path::new("-"));
     let summary_to = if json_to_stdout { Stream::Err } else { Stream::Out };
     match &args.plan {
-        Some(_) if json_to_stdout => say(Stream::Out, &plan.to_json())?,
-        Some(file) => write_file(file, plan.to_json().as_bytes())?,
+        Some(_) if json_to_stdout => say(Stream::Out, &made.plan.to_json())?,
+        Some(file) => write_file(file, made.plan.to_json().as_bytes())?,
         None => {}
     }
-    let mut text = report::summary(scenario, &plan, &assessment);
-    if let Some(obstacle) = &obstacle {
+    let mut text = report::summary(scenario, &made.plan, &made.assessment);
+    text.push_str(&report::steps(&made.steps));
+    if let Some(obstacle) = &made.obstacle {
         text.push_str(&report::obstacle(scenario, obstacle));
     }
     if let Some(folder) = &args.out {
-        let flown = Flown { plan: &plan, assessment: &assessment };
-        let settings = settings(args);
-        let written = with_progress("drawing", || write_folder(scenario, flown, metric, &settings, folder))?;
+        let settings = settings(scenario, args);
+        let written = with_progress("drawing", || write_folder(scenario, &made, metric, &settings, folder))?;
         text.push_str(&list(folder, &written));
     }
     say(summary_to, &text)?;
-    Ok(Verdict::on(assessment.feasible))
+    Ok(Verdict::on(made.assessment.feasible))
+}
+
+/// A plan, made in one piece or in steps.
+struct Made {
+    plan: PlanFile,
+    assessment: Assessment,
+    obstacle: Option<Obstacle>,
+    /// None where it was made in one piece.
+    steps: Vec<Step>,
+}
+
+fn make(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Made, Failure> {
+    if scenario.rolling.is_some() && !args.once {
+        let rolled = steps::roll(scenario, &options(args))?;
+        let obstacle = rolled.obstacle().cloned();
+        return Ok(Made { plan: rolled.plan, assessment: rolled.assessment, obstacle, steps: rolled.steps });
+    }
+    let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
+    let Planned { plan, assessment, obstacle, .. } = planned;
+    Ok(Made { plan, assessment, obstacle, steps: Vec::new() })
 }
 
 fn options(args: &PlanArgs) -> Options {
@@ -100,12 +122,13 @@ fn options(args: &PlanArgs) -> Options {
 }
 
 /// What a report says of how the plan was made.
-fn settings(args: &PlanArgs) -> Vec<(String, String)> {
+fn settings(scenario: &ScenarioFile, args: &PlanArgs) -> Vec<(String, String)> {
     let precision = match args.precision {
         PrecisionArg::F32 => "32 bits",
         PrecisionArg::F64 => "64 bits",
     };
-    let pieces = if args.once { "one piece, every track known" } else { "as the scenario says" };
+    let in_steps = scenario.rolling.is_some() && !args.once;
+    let pieces = if in_steps { "steps, as the scenario says" } else { "one piece, every track known" };
     let row = |name: &str, value: &str| (name.to_owned(), value.to_owned());
     vec![row("computed with", precision), row("planned in", pieces)]
 }
@@ -133,11 +156,12 @@ struct Written {
 
 fn write_folder(
     scenario: &ScenarioFile,
-    flown: Flown<'_>,
+    made: &Made,
     metric: Metric,
     settings: &[(String, String)],
     folder: &Path,
 ) -> Result<Written, Failure> {
+    let flown = Flown { plan: &made.plan, assessment: &made.assessment, steps: &made.steps };
     let mut files = Vec::new();
     let mut put = |name: String, bytes: &[u8]| -> Result<(), Failure> {
         write_file(&folder.join(&name), bytes)?;
@@ -146,8 +170,9 @@ fn write_folder(
     };
     put("plan.json".into(), flown.plan.to_json().as_bytes())?;
     let (plan, assessment, background) = (flown.plan, flown.assessment, metric);
+    let steps: Vec<PlanFile> = made.steps.iter().map(|step| step.plan.clone()).collect();
     let way = Way::Planned;
-    let story = Story { plan, way, assessment, steps: &[], wire: &[], background, settings };
+    let story = Story { plan, way, assessment, steps: &steps, wire: &[], background, settings };
     put("report.html".into(), page::html(scenario, &story)?.as_bytes())?;
     let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
     let pictures = [
@@ -175,6 +200,9 @@ fn write_folder(
             }
             Err(cause) => skipped = Some(format!("no mission files: {cause}")),
         }
+    }
+    if !made.steps.is_empty() {
+        files.extend(steps::write(scenario, flown, metric, folder)?);
     }
     Ok(Written { files, skipped })
 }

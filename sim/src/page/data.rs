@@ -191,7 +191,7 @@ pub fn gather(scenario: &ScenarioFile, story: &Story<'_>) -> Result<Data, Box<Fi
     let first = times.first().copied().unwrap_or(scenario.start_time);
     let time = [first, times.last().copied().unwrap_or(first + 1.0)];
     let scale = map_unit(scenario).1;
-    let flown = Flown { plan, assessment: story.assessment };
+    let flown = Flown { plan, assessment: story.assessment, steps: &[] };
     let panels = illustrate::panels(scenario, flown, 1.0);
     let agents = scenario.agents.iter().enumerate();
     let found = margins::margins(scenario, plan, story.assessment);
