@@ -30,12 +30,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     // One mission an agent, for QGroundControl and for programs that read QGC WPL 110.
     for mission in missions(&scenario, &planned.plan)? {
         let waypoints = mission.to_waypoints();
-        println!(
-            "{}: {} lines of waypoints, the first:\n{}",
-            mission.agent,
-            waypoints.lines().count(),
-            waypoints.lines().take(3).collect::<Vec<_>>().join("\n")
-        );
+        let first: Vec<&str> = waypoints.lines().take(3).collect();
+        println!("{}: {} lines of waypoints, the first:\n{}", mission.agent, waypoints.lines().count(), first.join("\n"));
     }
     Ok(())
 }

@@ -418,23 +418,44 @@ pub struct Limit {
     pub max: Option<f64>,
 }
 
-/// Replanning in steps.
+/// Planning in steps: `steps`, or `adaptive`.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rolling {
-    /// Number of steps.
+    /// Number of steps of equal length.
     #[schemars(range(min = 1))]
-    pub steps: u32,
-    /// How much of the world each step knows.
+    pub steps: Option<u32>,
+    /// Steps that shorten where much changes.
+    pub adaptive: Option<Adaptive>,
+    /// What each step knows of moving sensors.
     pub reveal: Option<Reveal>,
 }
 
-/// How much of the world each step knows.
+/// Steps that shorten where much changes.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Adaptive {
+    /// Intervals of the shortest step.
+    #[schemars(range(min = 1))]
+    pub shortest: u32,
+    /// Intervals of the longest step.
+    #[schemars(range(min = 1))]
+    pub longest: u32,
+    /// Mean change of the metrics along the plan, as a part of their range, from which on steps shorten.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub change: f64,
+}
+
+/// What each step knows of moving sensors.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Reveal {
-    /// Where sensors are at the time of the step.
+    /// Where they are at the time of the step.
     Current,
+    /// How they move at the time of the step.
+    Predicted,
+    /// Their tracks.
+    Known,
 }
 
 /// What varies when the plan is flown many times: standard deviations.
