@@ -31,7 +31,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     for mission in missions(&scenario, &planned.plan)? {
         let waypoints = mission.to_waypoints();
         let first: Vec<&str> = waypoints.lines().take(3).collect();
-        println!("{}: {} lines of waypoints, the first:\n{}", mission.agent, waypoints.lines().count(), first.join("\n"));
+        println!(
+            "{}: {} lines of waypoints, the first:\n{}",
+            mission.agent,
+            waypoints.lines().count(),
+            first.join("\n")
+        );
     }
     Ok(())
 }

@@ -1,5 +1,7 @@
 //! The command line: what can be asked, and how each command is explained.
 
+mod fly;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,6 +11,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::autopilot::Home;
 use crate::trade::{Amount, Over};
 
+pub use fly::{FlyArgs, FlyModeArg, ViewArgs};
+
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Green.on_default().bold())
     .usage(AnsiColor::Green.on_default().bold())
@@ -16,9 +20,10 @@ const STYLES: Styles = Styles::styled()
     .placeholder(AnsiColor::Cyan.on_default());
 
 const AFTER: &str = "\
-Without a command, the built-in scenario `square8-detection` is planned into the folder `out`.
+Without a command, the built-in scenario `wight-jam` is planned and flown in simulation, over MAVLink, into the folder
+`out`.
 
-Exit status: 0 done, 1 the plan is not feasible, 2 bad input or usage.
+Exit status: 0 done, 1 the plan is not feasible or the flight did not arrive, 2 bad input or usage.
 
 Example:
   quietpath new scenario.toml && quietpath plan scenario.toml --out out";
@@ -45,6 +50,28 @@ Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
 Example:
   quietpath plan scenario.toml --out out")]
     Plan(PlanArgs),
+    /// Plan a scenario and fly it over MAVLink, in simulation or with an autopilot elsewhere
+    #[command(after_help = "\
+The bridge knows where sensors are, hears where they move, and plans anew in flight; frames pass two UDP sockets on
+127.0.0.1. The same seed flies the same flight. With --connect, the vehicle is one that somebody else has started and
+takes off; sensors are the scenario's, nothing is jammed, and quietpath autopilot is such a vehicle. Ctrl-C ends the
+flight, and what was flown is written all the same.
+
+Exit status: 0 at the goal, 1 ended before it, 2 bad input.
+
+Example:
+  quietpath fly scenario.toml --like ardupilot --mode mission --loss 0.1 --out out")]
+    Fly(FlyArgs),
+    /// Show a flight of `quietpath-bridge` to browsers on this machine while it goes on
+    #[command(after_help = "\
+The page follows the record of the flight as it is written; it cannot change anything. `quietpath fly --view` shows a
+simulated flight. Ctrl-C ends it.
+
+Exit status: 0 ended, 2 bad input.
+
+Example:
+  quietpath view flight.jsonl")]
+    View(ViewArgs),
     /// Plan over a range of deadlines or budgets, and draw what each buys
     #[command(after_help = "\
 Values have units: 105% of the shortest flight time (deadline) or of the flight's time (budgets), 18.7s; plain numbers

@@ -3,7 +3,7 @@
 //! | constraint | figure | bound | unit |
 //! |---|---|---|---|
 //! | duration | arrival | `time.max` | s |
-//! | start, goal | distance of the path's end from it | 0 | m |
+//! | start, goal | distance of the path's end from it | the core's tolerance | m |
 //! | domain | least distance of a node from an edge | 0 | m |
 //! | speed, accel | largest along the path | the agent's | m/s, m/s^2 |
 //! | jam budget, dropout budget | integral over time | the agent's | s |
@@ -18,6 +18,7 @@ use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::scenario::{AgentEntry, RegionEntry};
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::planning::{AgentSeries, Assessment};
+use quietpath_core::constraints::TOLERANCE;
 use quietpath_core::scenario::Side;
 
 use crate::report::extreme;
@@ -118,9 +119,11 @@ fn own(scenario: &ScenarioFile, entry: &AgentEntry, agent: &AgentPlan, series: &
         rooms.fold(f64::INFINITY, f64::min)
     };
     let room = agent.path.iter().map(edge).fold(f64::INFINITY, f64::min) * unit_m;
+    let sides = scenario.domain.max.iter().zip(&scenario.domain.min).map(|(high, low)| high - low);
+    let near = TOLERANCE * sides.fold(0.0, f64::max) * unit_m;
     vec![
-        row("start", "off its start", off(agent.path.first(), &entry.start), 0.0, "m"),
-        row("goal", "off its goal", off(agent.path.last(), &entry.goal), 0.0, "m"),
+        row("start", "off its start", off(agent.path.first(), &entry.start), near, "m"),
+        row("goal", "off its goal", off(agent.path.last(), &entry.goal), near, "m"),
         Margin { sense: Sense::AtLeast, ..row("domain", "to the domain's edge", room, 0.0, "m") },
         row("speed", "top speed", most(&series.speed), entry.speed_max * unit_m, "m/s"),
         row("accel", "top acceleration", most(&series.accel), entry.accel_max * unit_m, "m/s\u{b2}"),

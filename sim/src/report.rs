@@ -258,6 +258,16 @@ fn figures(scenario: &ScenarioFile, plan: &PlanFile, assessment: &Assessment) ->
     rows
 }
 
+/// Which constraints a flight kept: a vehicle flies a hair beside its plan.
+#[must_use]
+pub fn kept(assessment: &Assessment) -> String {
+    let broken: Vec<String> = (assessment.violations.iter())
+        .filter(|(_, size)| *size > TOLERANCE)
+        .map(|(name, size)| format!("{} (by {:.2} %)", name.replace('_', " "), 100.0 * size))
+        .collect();
+    if broken.is_empty() { "all kept".into() } else { format!("all kept but {}", broken.join(", ")) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -61,6 +61,26 @@ pub fn landscapes(scenario: &ScenarioFile, view: &View) -> Result<Vec<Grid>, Box
     })
 }
 
+/// Probability that the sensors detect an agent without controls at a position, length units, at a time, s.
+///
+/// # Errors
+/// As the scenario's conversion to the core; a checked scenario has none.
+pub fn detection_at(scenario: &ScenarioFile, time: f64, position: &[f64]) -> Result<f64, Box<FileError>> {
+    super::on_large_stack(|| match scenario.dimension {
+        3 => detection_in::<3>(scenario, time, position),
+        _ => detection_in::<2>(scenario, time, position),
+    })
+}
+
+fn detection_in<const DIM: usize>(
+    scenario: &ScenarioFile,
+    time: f64,
+    position: &[f64],
+) -> Result<f64, Box<FileError>> {
+    let problem = scenario.to_core::<f64, DIM>()?;
+    Ok(point_values(&problem.view(), time, &point::<f64, DIM>(position), &mut super::scratch::<DIM>()).detection)
+}
+
 fn landscape_in<const DIM: usize>(scenario: &ScenarioFile, view: &View) -> Result<Grid, Box<FileError>> {
     let grid = swept::<DIM>(scenario, view, &[view.metric])?.pop();
     grid.ok_or_else(|| too_few_ranging(scenario, view.metric))

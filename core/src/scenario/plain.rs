@@ -11,8 +11,8 @@
 //! Limits: what is left out here is what scenario files leave out, with the same values.
 
 use super::{
-    Agent, AgentSet, Detection, Domain, Draft, Metric, Motion, Pooling, Ranging, Reduce, ReferencePoint, Sense, Sensor,
-    Susceptibility, Term, Timing, Window,
+    Agent, AgentSet, Detection, Domain, Draft, Metric, Motion, Pooling, Ranging, Reduce, ReferencePoint, Sense,
+    Sensor, Susceptibility, Term, Timing, Window,
 };
 use crate::math::{Point, Real};
 

@@ -22,13 +22,13 @@ use quietpath_core::scenario::Metric;
 
 use super::{landscape, load, plan::background};
 use crate::cli::{FlyArgs, FlyModeArg, LikeArg};
-use crate::fly::{self, Flown, Look, Manner, Progress};
+use crate::fly::{self, Flown, Manner, Progress, ended};
 use crate::illustrate;
 use crate::outcome::{Failure, Stream, Verdict, progress_bar, say, with_progress, write_file};
 use crate::page::{self, Story, Way};
 use crate::report;
 use crate::units;
-use crate::view::{self, Server, Shown};
+use crate::view::{self, Server, shown};
 
 /// The scenario that is flown when nothing is asked.
 pub const BUILT_IN: &str = include_str!("../../scenarios/wight-jam.toml");
@@ -58,6 +58,7 @@ pub fn built_in() -> Result<Verdict, Failure> {
         loss: 0.0,
         seed: 1,
         speedup: None,
+        connect: None,
         metric: None,
         view: None,
         out: BUILT_IN_OUT.into(),
@@ -90,6 +91,7 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
         loss: args.loss,
         seed: args.seed,
         speedup: args.speedup,
+        connect: args.connect.clone(),
     };
     let bar = progress_bar("planning");
     let unit_m = scenario.frame.unit_m;
@@ -98,12 +100,15 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
     if let Some(server) = &server {
         say(Stream::Err, &format!("the flight as it goes on: http://{}/\n", server.address()))?;
     }
-    let mut shown = None;
-    let flown = fly::fly(scenario, manner, |look| {
+    let mut last: Option<Instant> = None;
+    let flown = fly::fly(scenario, &manner, |look| {
         bar.set_message(line(look.progress, unit_m));
-        if let Some(server) = server.as_ref().filter(|_| shown.is_none_or(|at: Instant| at.elapsed() >= view::EVERY)) {
-            shown = Some(Instant::now());
-            show(server, look, metric)?;
+        let is_due = last.is_none_or(|last| last.elapsed() >= view::EVERY) || look.end.is_some();
+        if let Some(server) = server.as_ref().filter(|_| is_due)
+            && let Some(page) = shown(look, metric)?
+        {
+            last = Some(Instant::now());
+            server.show(page);
         }
         Ok(())
     })?;
@@ -114,27 +119,6 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
     let files = with_progress("drawing", || write(scenario, &flown, metric, args))?;
     say(Stream::Out, &summary(scenario, &flown, &files, args)?)?;
     Ok(Verdict::on(flown.end == End::Done))
-}
-
-/// Shows what is known by now to those who look on.
-fn show(server: &Server, look: Look<'_>, metric: Metric) -> Result<(), Failure> {
-    // Before there is a way to draw, a vehicle stands at the start of its plan.
-    let track = if look.track.nodes() >= 2 { look.track } else { return Ok(()) };
-    let now = look.progress.time.unwrap_or(track.start_time);
-    let world = crate::rehearsal::revealed(look.world, now);
-    let assessment = planning::assess(&world, track, "the flight")?;
-    let story = Story {
-        plan: track,
-        way: Way::Flown,
-        assessment: &assessment,
-        steps: look.steps,
-        wire: &[],
-        background: metric,
-        settings: &[("phase".to_owned(), look.progress.phase.to_owned())],
-    };
-    let data = page::json(&world, &story)?;
-    server.show(Shown { title: world.name.clone(), data });
-    Ok(())
 }
 
 /// One line of progress: step, time, position, peak detection, replans, link.
@@ -152,15 +136,6 @@ fn line(progress: &Progress, unit_m: f64) -> String {
         progress.frames[1],
         100.0 * progress.loss,
     )
-}
-
-fn ended(end: &End) -> String {
-    match end {
-        End::Done => "at the goal".into(),
-        End::Released(why) => format!("let go: {why}"),
-        End::Stopped(why) => format!("stopped: {why}"),
-        End::Failed(why) => format!("failed: {why}"),
-    }
 }
 
 /// Writes everything; the names of the files.
@@ -189,7 +164,7 @@ fn write(scenario: &ScenarioFile, flown: &Flown, metric: Metric, args: &FlyArgs)
         put(name, step.to_json().as_bytes())?;
     }
     let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
-    let drawn = illustrate::Flown { plan: &flown.track, assessment: &assessment };
+    let drawn = illustrate::Flown { plan: &flown.track, assessment: &assessment, steps: &[] };
     let pictures = [
         ("landscape", illustrate::landscape(scenario, &grid, Some(&flown.track)).map_err(Failure::input)?),
         ("series", illustrate::series(scenario, drawn)),
@@ -258,6 +233,7 @@ fn summary(scenario: &ScenarioFile, flown: &Flown, files: &[String], args: &FlyA
     };
     row("scenario", scenario.name.clone());
     row("ended", ended(&flown.end));
+    row("constraints", report::kept(&assessment));
     row("flight time", units::duration(flown.track.duration));
     for agent in &assessment.agents {
         for (label, value) in report::agent_rows(scenario, &assessment, agent) {

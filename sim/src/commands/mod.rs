@@ -3,6 +3,7 @@
 pub mod autopilot;
 pub mod check;
 pub mod completions;
+pub mod fly;
 pub mod import;
 pub mod landscape;
 pub mod new;
@@ -12,6 +13,7 @@ pub mod schema;
 pub mod steps;
 pub mod study;
 pub mod trade;
+pub mod view;
 
 use quietpath_bridge::file::ScenarioFile;
 
@@ -24,8 +26,10 @@ use crate::outcome::{Failure, Stream, Verdict, say};
 /// Bad input, or output that cannot be written.
 pub fn run(cli: Cli) -> Result<Verdict, Failure> {
     match cli.command {
-        None => plan::built_in(),
+        None => fly::built_in(),
         Some(Command::Plan(args)) => plan::run(&args),
+        Some(Command::Fly(args)) => fly::run(&args),
+        Some(Command::View(args)) => view::run(&args),
         Some(Command::Trade(args)) => trade::run(&args),
         Some(Command::Landscape(args)) => landscape::run(&args),
         Some(Command::Check(args)) => check::run(&args),

@@ -15,7 +15,7 @@
 //! A plan that is not feasible is drawn and written for people to look at, but not as a mission or map.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use quietpath_bridge::file::mission::{file_name, missions};
 use quietpath_bridge::file::{PlanFile, ScenarioFile, geojson};
@@ -29,10 +29,6 @@ use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
 use crate::page::{self, Story, Way};
 use crate::report;
 
-/// The scenario that is planned when nothing is asked.
-pub const BUILT_IN: &str = include_str!("../../scenarios/square8-detection.toml");
-/// Where its files go.
-const BUILT_IN_OUT: &str = "out";
 /// Cells along the longer side of the landscape behind a flight.
 const CELLS: usize = 240;
 
@@ -43,24 +39,6 @@ const CELLS: usize = 240;
 pub fn run(args: &PlanArgs) -> Result<Verdict, Failure> {
     let scenario = load(&args.scenario)?;
     carry_out(&scenario, args)
-}
-
-/// Plans the built-in scenario into the folder `out`.
-///
-/// # Errors
-/// Files that cannot be written.
-pub fn built_in() -> Result<Verdict, Failure> {
-    let scenario = ScenarioFile::parse("built-in scenario", BUILT_IN)?.scenario;
-    let args = PlanArgs {
-        scenario: String::new(),
-        out: Some(PathBuf::from(BUILT_IN_OUT)),
-        plan: None,
-        precision: PrecisionArg::F64,
-        metric: None,
-        once: false,
-    };
-    say(Stream::Out, "Planning the built-in scenario; `quietpath --help` tells what else there is.\n\n")?;
-    carry_out(&scenario, &args)
 }
 
 fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failure> {

@@ -2,36 +2,39 @@
 //!
 //! The bridge knows where sensors are now ([`revealed`]), trackers tell it where they have moved every
 //! [`SEEN_S`], and it plans anew in flight: that is the rolling horizon. Frames pass two UDP sockets on the loopback interface,
-//! with the faults that were asked for. What comes out is what was flown, and everything about how.
+//! with the faults that were asked for. What comes out is what was flown, and everything about how. An autopilot elsewhere
+//! can take the place of the simulated one; the sensors are the scenario's all the same.
 //!
-//! | module | what |
-//! |---|---|
-//! | [`wire`] | what went over the wire, for people to read |
-//!
-//! Limits: the first agent of a scenario flies; wind is calm ([`crate::study`] has it).
+//! Limits: the first agent of a scenario flies; wind is calm ([`crate::study`] has it). Nothing is jammed with an autopilot
+//! elsewhere: `quietpath-bridge run --arm-jammer` is for that.
 
-pub mod wire;
+mod craft;
+mod follow;
+mod watch;
 
-use std::cell::RefCell;
-use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use quietpath_bridge::capacity::NODES;
-use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::flight::settings::{PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{self, End, FlyMode, Level};
-use quietpath_bridge::frame::LocalFrame;
+use quietpath_bridge::link::Address;
 use quietpath_bridge::link::memory::Faults;
 use quietpath_bridge::planning::{self, Options, Rollout};
 use quietpath_bridge::telemetry::Autopilot;
+use quietpath_core::horizon::Cadence;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 use crate::autopilot::payload::{Kind, Spec};
 use crate::autopilot::{self, Pilot};
 use crate::outcome::Failure;
 use crate::page::Message;
-use crate::rehearsal::{Event, Hop, Rehearsal, Setup, revealed, seen};
-use wire::Wiretap;
+use crate::rehearsal::{Hop, Rehearsal, Setup, revealed, seen};
+use craft::{Craft, Remote, Simulated};
+use watch::Watch;
+
+pub use follow::follow;
 
 /// Time between two sightings of the sensors that move, s.
 pub const SEEN_S: f64 = 5.0;
@@ -44,15 +47,17 @@ const LEAD_S: f64 = 3.0;
 /// Component ids of the payloads on board.
 const JAMMER: u8 = 26;
 const TRANSMITTER: u8 = 27;
-/// How long a flight may take, as a multiple of `time.max`, and in addition, s.
+/// How long a simulated flight may take, as a multiple of `time.max`, and in addition, s.
 const PATIENCE: (f64, f64) = (1.5, 900.0);
 /// Time between two reports of progress.
 const TELL: Duration = Duration::from_millis(150);
+/// Exit status of a program that a second signal ends at once.
+const SIGNALLED: i32 = 130;
 
 /// How to fly.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Manner {
-    /// Which autopilot is simulated.
+    /// Which autopilot is simulated, or expected.
     pub like: Autopilot,
     /// Who steers.
     pub mode: FlyMode,
@@ -60,8 +65,10 @@ pub struct Manner {
     pub loss: f64,
     /// Seed of the faults.
     pub seed: u64,
-    /// How many times faster than time; as fast as it goes where it is not given.
+    /// How many times faster than time; where it is not given, as fast as it goes in simulation, and 1 elsewhere.
     pub speedup: Option<f64>,
+    /// Where the autopilot is, if it is not simulated in this process.
+    pub connect: Option<Address>,
 }
 
 /// Where a flight stands, for who looks on.
@@ -96,6 +103,10 @@ pub struct Look<'a> {
     pub steps: &'a [PlanFile],
     /// The world as the bridge knows it.
     pub world: &'a ScenarioFile,
+    /// What went over the wire, with times of the scenario.
+    pub wire: &'a [Message],
+    /// How it ended; `None` while it goes on.
+    pub end: Option<&'a End>,
 }
 
 /// What was flown.
@@ -140,14 +151,19 @@ pub fn first_plan(truth: &ScenarioFile) -> Result<(ScenarioFile, PlanFile), Fail
 
 /// How the bridge is told to fly a scenario.
 #[must_use]
-pub fn settings(truth: &ScenarioFile, plan: &PlanFile, mode: FlyMode) -> flight::Settings {
-    let steps = truth.rolling.map_or(STEPS, |rolling| rolling.steps).max(1);
-    let interval_s = plan.duration / steps as f64;
-    let lead_s = LEAD_S.max(plan.duration / plan.nodes().max(2) as f64);
+pub fn settings(truth: &ScenarioFile, plan: &PlanFile, manner: &Manner) -> flight::Settings {
+    let steps = match truth.rolling.map(|rolling| rolling.cadence) {
+        Some(Cadence::Even { steps }) => steps,
+        // In flight plans come at even times: as often as the shortest step wants it.
+        Some(Cadence::Adaptive { shortest, .. }) => truth.intervals.div_ceil(shortest.max(1)),
+        None => STEPS,
+    };
+    let interval_s = plan.duration / steps.max(1) as f64;
+    let lead_s = LEAD_S.min(0.5 * interval_s);
     let replan = (truth.agents.len() == 1).then(|| Replanning {
         interval_s,
         lead_s,
-        time_to_live_s: 3.0 * (interval_s + lead_s),
+        time_to_live_s: plan.duration,
         ..Replanning::default()
     });
     let entry = |kind, component| PayloadEntry { kind, component, instance: 0, mission_output: None };
@@ -159,11 +175,13 @@ pub fn settings(truth: &ScenarioFile, plan: &PlanFile, mode: FlyMode) -> flight:
     if first.is_some_and(|agent| agent.dropout.is_some()) {
         payload.push(entry(PayloadKind::Transmitter, TRANSMITTER));
     }
-    flight::Settings { mode, replan, payload, jammer_armed: true, ..flight::Settings::default() }
+    // A simulated jammer radiates nothing.
+    let jammer_armed = manner.connect.is_none();
+    flight::Settings { mode: manner.mode, replan, payload, jammer_armed, ..flight::Settings::default() }
 }
 
 /// The vehicle that flies it.
-fn vehicle(truth: &ScenarioFile, manner: Manner, flight: &flight::Settings) -> Result<autopilot::Settings, Failure> {
+fn vehicle(truth: &ScenarioFile, manner: &Manner, flight: &flight::Settings) -> Result<autopilot::Settings, Failure> {
     let nowhere = || {
         let help = "add latitude_deg, longitude_deg and altitude_m to [frame]";
         Failure::Input(format!("{} does not say where on the Earth it lies\n  help: {help}", truth.file_name()))
@@ -183,179 +201,96 @@ fn vehicle(truth: &ScenarioFile, manner: Manner, flight: &flight::Settings) -> R
     Ok(vehicle)
 }
 
-/// Flies a scenario; `tell` hears how it goes.
-///
-/// # Errors
-/// A scenario that cannot be planned or flown, a loopback interface that does not carry.
-pub fn fly(truth: &ScenarioFile, manner: Manner, mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>) -> Result<Flown, Failure> {
-    let (known, plan) = first_plan(truth)?;
-    let settings = settings(truth, &plan, manner.mode);
+/// What flies a scenario: an autopilot here or elsewhere, and the bridge.
+fn craft(
+    truth: &ScenarioFile,
+    known: ScenarioFile,
+    plan: &PlanFile,
+    manner: &Manner,
+) -> Result<Box<dyn Craft>, Failure> {
+    let settings = settings(truth, plan, manner);
+    if let Some(address) = &manner.connect {
+        let remote = Remote::new(address.clone(), manner.speedup.unwrap_or(1.0), &known, plan, settings)?;
+        return Ok(Box::new(remote));
+    }
     let vehicle = vehicle(truth, manner, &settings)?;
     let mut setup = Setup::new(known, plan.clone(), settings, vehicle);
     setup.faults = Faults { loss: manner.loss, ..Faults::NONE };
     setup.seed = manner.seed;
     setup.tick = TICK;
-    setup.hop = Hop::loopback().map_err(|cause| Failure::Input(format!("no UDP on the loopback interface: {cause}")))?;
-    let mut rehearsal = Rehearsal::new(setup)?;
-    let tap = Rc::new(RefCell::new(Wiretap::default()));
-    let ear = Rc::clone(&tap);
-    rehearsal.listen(Box::new(move |time, way, message| ear.borrow_mut().hear(time, way, message)));
+    setup.hop =
+        Hop::loopback().map_err(|cause| Failure::Input(format!("no UDP on the loopback interface: {cause}")))?;
+    Ok(Box::new(Simulated::new(Rehearsal::new(setup)?, manner.speedup)))
+}
+
+/// A flag that the first signal raises; the second one ends the program.
+fn signals() -> Result<Arc<AtomicBool>, Failure> {
+    let raised = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, SIGNALLED, Arc::clone(&raised))
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&raised)))
+            .map_err(Failure::input)?;
+    }
+    Ok(raised)
+}
+
+/// Flies a scenario; `tell` hears how it goes. A signal ends the flight, and what was flown until then comes out.
+///
+/// # Errors
+/// A scenario that cannot be planned or flown, a loopback interface that does not carry, what `tell` fails with.
+pub fn fly(
+    truth: &ScenarioFile,
+    manner: &Manner,
+    mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>,
+) -> Result<Flown, Failure> {
+    let (known, plan) = first_plan(truth)?;
+    let mut craft = craft(truth, known, &plan, manner)?;
+    let craft = craft.as_mut();
     let mut watch = Watch::new(truth, &plan)?;
+    let signalled = signals()?;
     let begin = Instant::now();
     let mut told = begin;
+    let mut look = truth.start_time;
+    let mut is_stopping = false;
     let until = PATIENCE.0 * (truth.time.max - truth.start_time) + PATIENCE.1;
-    while rehearsal.end().is_none() {
-        let events = rehearsal.step().map_err(|cause| Failure::Input(format!("the loopback interface: {cause}")))?;
-        watch.note(&rehearsal, events);
-        if let Some(time) = rehearsal.scenario_time().filter(|time| *time >= watch.look) {
-            watch.look = time + SEEN_S;
-            seen(truth, time).into_iter().for_each(|sighting| rehearsal.observe(sighting));
+    while craft.end().is_none() {
+        let said = craft.step()?;
+        watch.note(craft, said);
+        if let Some(time) = watch.scenario_time(craft).filter(|time| *time >= look) {
+            look = time + SEEN_S;
+            seen(truth, time).into_iter().for_each(|sighting| craft.observe(sighting));
         }
-        if rehearsal.now().seconds() > until {
-            rehearsal.stop("it took too long");
+        let is_late = manner.connect.is_none() && craft.now().seconds() > until;
+        if !is_stopping && (is_late || signalled.load(Ordering::Relaxed)) {
+            is_stopping = true;
+            craft.stop(if is_late { "it took too long" } else { "ended by a signal" });
         }
         if told.elapsed() >= TELL {
             told = Instant::now();
-            watch.look_on(&rehearsal, &mut tell)?;
-        }
-        if let Some(speedup) = manner.speedup {
-            let ahead = rehearsal.now().seconds() / speedup - begin.elapsed().as_secs_f64();
-            std::thread::sleep(Duration::from_secs_f64(ahead.clamp(0.0, 1.0)));
+            watch.look_on(craft, &mut tell)?;
         }
     }
-    watch.look_on(&rehearsal, &mut tell)?;
-    let end = rehearsal.end().cloned().unwrap_or(End::Done);
-    let began = rehearsal.began().map_or(0.0, |began| began.seconds());
-    drop(rehearsal);
-    let zero = truth.start_time - began;
-    let wire = tap.borrow().messages(zero);
+    watch.finish(craft);
+    watch.look_on(craft, &mut tell)?;
+    let zero = truth.start_time - craft.began().map_or(0.0, |began| began.seconds());
     Ok(Flown {
         track: watch.track(),
-        steps: watch.steps,
-        wire,
-        log: watch.log,
-        end,
+        wire: craft.wire().messages(zero),
+        end: craft.end().cloned().unwrap_or(End::Done),
         seconds: begin.elapsed().as_secs_f64(),
+        steps: watch.steps,
+        log: watch.log,
         last: watch.last,
     })
 }
 
-/// Takes notes of a flight.
-struct Watch<'a> {
-    truth: &'a ScenarioFile,
-    frame: LocalFrame,
-    steps: Vec<PlanFile>,
-    log: Vec<(f64, Level, String)>,
-    times: Vec<f64>,
-    path: Vec<Vec<f64>>,
-    jam: Vec<f64>,
-    dropout: Vec<f64>,
-    /// Time between two places of the track, s.
-    every: f64,
-    /// When sensors are looked at next, s.
-    look: f64,
-    last: Progress,
-}
-
-impl<'a> Watch<'a> {
-    fn new(truth: &'a ScenarioFile, plan: &PlanFile) -> Result<Self, Failure> {
-        let frame = LocalFrame::of(truth).ok_or_else(|| Failure::input("the scenario lies nowhere on the Earth"))?;
-        let longest = truth.time.max - truth.start_time;
-        let every = (plan.duration / (4 * plan.nodes().max(2)) as f64).max(1.1 * longest / NODES as f64);
-        Ok(Self {
-            truth,
-            frame,
-            steps: vec![plan.clone()],
-            log: Vec::new(),
-            times: Vec::new(),
-            path: Vec::new(),
-            jam: Vec::new(),
-            dropout: Vec::new(),
-            every,
-            look: truth.start_time,
-            last: Progress::default(),
-        })
-    }
-
-    /// After every step: what happened, and where the vehicle is.
-    fn note(&mut self, rehearsal: &Rehearsal, events: Vec<Event>) {
-        let now = rehearsal.now().seconds();
-        for event in events {
-            if let Event::Said(level, text) = event {
-                self.log.push((now, level, text));
-            }
-        }
-        let flies = rehearsal.flight().plan();
-        if self.steps.last().is_some_and(|last| flies.start_time > last.start_time) {
-            self.steps.push(flies.clone());
-        }
-        let Some(time) = rehearsal.scenario_time() else { return };
-        if rehearsal.flight().phase() != "fly" || self.path.len() + 1 >= NODES {
-            return;
-        }
-        if self.times.last().is_none_or(|last| time >= last + self.every) {
-            self.times.push(time);
-            self.path.push(self.position(rehearsal));
-            let level = |component| rehearsal.machine().payload(component).map_or(0.0, |payload| payload.level());
-            self.jam.push(f64::from(level(JAMMER)));
-            self.dropout.push(f64::from(1.0 - rehearsal.machine().payload(TRANSMITTER).map_or(1.0, |payload| payload.level())));
-        }
-    }
-
-    fn position(&self, rehearsal: &Rehearsal) -> Vec<f64> {
-        self.frame.position(&rehearsal.machine().place()).unwrap_or_default()
-    }
-
-    fn look_on(
-        &mut self,
-        rehearsal: &Rehearsal,
-        tell: &mut impl FnMut(Look<'_>) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
-        self.progress(rehearsal)?;
-        let (progress, steps, world) = (&self.last, &self.steps, rehearsal.flight().world());
-        tell(Look { progress, track: &self.track(), steps, world })
-    }
-
-    fn progress(&mut self, rehearsal: &Rehearsal) -> Result<(), Failure> {
-        let position = self.position(rehearsal);
-        let time = rehearsal.scenario_time();
-        let at = time.unwrap_or(self.truth.start_time);
-        let detection = planning::figures_at(self.truth, at, &position)?.detection;
-        let statistics = rehearsal.endpoint().statistics();
-        let is_flying = rehearsal.flight().phase() == "fly";
-        self.last = Progress {
-            phase: rehearsal.flight().phase(),
-            time,
-            position,
-            detection,
-            peak: if is_flying { self.last.peak.max(detection) } else { self.last.peak },
-            replans: self.steps.len() - 1,
-            frames: [statistics.frames_out, statistics.frames_in],
-            loss: statistics.loss(),
-        };
-        Ok(())
-    }
-
-    /// What was flown, as a plan.
-    fn track(&self) -> PlanFile {
-        let start_time = self.times.first().copied().unwrap_or_default();
-        let duration = self.times.last().copied().unwrap_or_default() - start_time;
-        let entry = self.truth.agents.first();
-        let agent = AgentPlan {
-            name: entry.map(|agent| agent.name.clone()).unwrap_or_default(),
-            path: self.path.clone(),
-            jam: entry.and_then(|agent| agent.jammer).map(|_| self.jam.clone()),
-            azimuth: None,
-            dropout: entry.and_then(|agent| agent.dropout).map(|_| self.dropout.clone()),
-        };
-        PlanFile {
-            scenario: self.truth.name.clone(),
-            start_time,
-            duration,
-            status: Some("flown".into()),
-            times: Some(self.times.clone()),
-            agents: vec![agent],
-            ..PlanFile::default()
-        }
+/// How a flight ended, in words.
+#[must_use]
+pub fn ended(end: &End) -> String {
+    match end {
+        End::Done => "at the goal".into(),
+        End::Released(why) => format!("let go: {why}"),
+        End::Stopped(why) => format!("stopped: {why}"),
+        End::Failed(why) => format!("failed: {why}"),
     }
 }

@@ -33,7 +33,7 @@ function words(time) {
 
 get('title').textContent = data.title;
 get('subtitle').textContent = data.subtitle;
-if (!data.feasible) get('subtitle').className = 'bad';
+if (data.alarming) get('subtitle').className = 'bad';
 tables(data);
 legend(data);
 

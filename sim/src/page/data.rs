@@ -78,7 +78,8 @@ pub struct Message {
 pub struct Data {
     title: String,
     subtitle: String,
-    feasible: bool,
+    /// Whether the heading is a warning.
+    alarming: bool,
     /// The landscape that shows first.
     background: &'static str,
     /// First and last instant, s.
@@ -198,7 +199,7 @@ pub fn gather(scenario: &ScenarioFile, story: &Story<'_>) -> Result<Data, Box<Fi
     Ok(Data {
         title: scenario.name.clone(),
         subtitle: illustrate::flight_words(scenario, plan),
-        feasible: story.assessment.feasible,
+        alarming: story.way == Way::Planned && !story.assessment.feasible,
         background: story.background.name(),
         time,
         clock: time_unit(time[1] - time[0]),
@@ -305,8 +306,12 @@ fn figures(scenario: &ScenarioFile, story: &Story<'_>) -> Vec<Row> {
     let row = |name: &str, value: String| (name.to_owned(), value);
     let status = story.plan.status.as_deref().unwrap_or("unknown").replace('_', " ");
     let verdict = if assessment.feasible { "feasible" } else { "not feasible" };
+    let verdict = match story.way {
+        Way::Planned => format!("{verdict} ({status})"),
+        Way::Flown => report::kept(assessment),
+    };
     let mut rows = vec![
-        row("verdict", format!("{verdict} ({status})")),
+        row("verdict", verdict),
         row("objective", report::trimmed_to(assessment.objective, 9)),
         row("flight time", units::duration(story.plan.duration)),
     ];

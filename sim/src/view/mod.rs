@@ -28,8 +28,13 @@ use tokio::sync::watch;
 use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::WatchStream;
 
+use quietpath_bridge::planning;
+use quietpath_core::Metric;
+
+use crate::fly::{Look, ended};
 use crate::outcome::Failure;
-use crate::page;
+use crate::page::{self, Story, Way};
+use crate::rehearsal::revealed;
 
 /// Least time between two events.
 pub const EVERY: Duration = Duration::from_millis(700);
@@ -58,8 +63,10 @@ impl Server {
     /// A port that is taken, no thread for the server.
     pub fn start(port: u16) -> Result<Self, Failure> {
         let failed = |cause: std::io::Error| Failure::Input(format!("no page on 127.0.0.1:{port}: {cause}"));
-        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().map_err(failed)?;
-        let listener = runtime.block_on(tokio::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port))).map_err(failed)?;
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().map_err(failed)?;
+        let listener =
+            runtime.block_on(tokio::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port))).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         let (shown, seen) = watch::channel(Arc::new(Shown::default()));
         let router = router(address, seen);
@@ -79,6 +86,25 @@ impl Server {
     pub fn show(&self, shown: Shown) {
         self.shown.send_replace(Arc::new(shown));
     }
+}
+
+/// The page of a flight that goes on: the way so far, the plans, the world as the bridge knows it. `None` before there is a
+/// way to draw.
+///
+/// # Errors
+/// As [`page::json`].
+pub fn shown(look: Look<'_>, background: Metric) -> Result<Option<Shown>, Failure> {
+    if look.track.nodes() < 2 {
+        return Ok(None);
+    }
+    let world = revealed(look.world, look.progress.time.unwrap_or(look.track.start_time));
+    let assessment = planning::assess(&world, look.track, "the flight")?;
+    let stands = look.end.map_or_else(|| look.progress.phase.to_owned(), ended);
+    let settings = [("the flight".to_owned(), stands), ("plans so far".to_owned(), look.steps.len().to_string())];
+    let (way, steps, wire) = (Way::Flown, look.steps, look.wire);
+    let story =
+        Story { plan: look.track, way, assessment: &assessment, steps, wire, background, settings: &settings };
+    Ok(Some(Shown { title: world.name.clone(), data: page::json(&world, &story)? }))
 }
 
 fn router(address: SocketAddr, seen: watch::Receiver<Arc<Shown>>) -> Router {
@@ -105,7 +131,8 @@ fn is_ours(address: SocketAddr, headers: &HeaderMap) -> bool {
     let hosts = [format!("127.0.0.1:{}", address.port()), format!("localhost:{}", address.port())];
     let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
     let host = text(header::HOST).is_some_and(|host| hosts.iter().any(|ours| ours == host));
-    let origin = text(header::ORIGIN).is_none_or(|origin| hosts.iter().any(|ours| origin == format!("http://{ours}")));
+    let origin =
+        text(header::ORIGIN).is_none_or(|origin| hosts.iter().any(|ours| origin == format!("http://{ours}")));
     host && origin
 }
 
