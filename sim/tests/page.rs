@@ -5,11 +5,27 @@
 
 #![expect(clippy::unwrap_used, reason = "the helpers of a test may fail as a test does")]
 
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+/// A browser that talks to nobody.
+const QUIET: [&str; 9] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+];
 
 /// Notes whatever goes wrong on the page; stands before all of its scripts.
 const WATCH: &str = "<script>
@@ -58,6 +74,8 @@ const wait = (ms) => new Promise((done) => setTimeout(done, ms));
   seen.hovered = look();
   seen.slider = slider.value;
   seen.charts = document.querySelectorAll('#charts canvas').length;
+  seen.takeovers = !document.getElementById('takeovers').hidden;
+  seen.wire = document.getElementById('wire-section').hidden ? 0 : document.querySelectorAll('#wire tbody tr').length;
   seen.tables = Object.fromEntries(['figures', 'margins', 'violations', 'provenance'].map((id) => [id, document.querySelectorAll('#' + id + ' tr').length]));
   seen.paper = getComputedStyle(document.body).backgroundColor;
   for (const part of [seen.before, seen.after, seen.hovered]) part.picture = [...part.picture].reduce((sum, letter) => (31 * sum + letter.charCodeAt(0)) | 0, 0);
@@ -89,15 +107,7 @@ fn visit(folder: &Path, page: &str, screen: Screen) -> Value {
     std::fs::write(&probed, if width < 500 { frame } else { text }).unwrap();
     let mut command = Command::new("chromium");
     command
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--disable-quic",
-            "--no-first-run",
-            "--hide-scrollbars",
-        ])
-        .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
+        .args(QUIET)
         .args(["--enable-logging=stderr", "--virtual-time-budget=20000", "--dump-dom"])
         .arg(format!("--user-data-dir={}", folder.join("browser").display()))
         .arg(format!("--window-size={},{}", width.max(500), height));
@@ -128,6 +138,16 @@ fn decoded(text: &str) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// Flies a scenario in a folder of its own.
+fn flown(name: &str) -> TempDir {
+    let room = TempDir::new().unwrap();
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{name}.toml"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quietpath"));
+    let output = command.current_dir(&room).arg("fly").arg(scenario).args(["--out", "."]).output().unwrap();
+    assert!(output.status.success());
+    room
 }
 
 /// Plans a scenario in a folder of its own.
@@ -183,6 +203,63 @@ fn every_metric_has_a_landscape_and_every_table_rows() {
     for table in ["figures", "margins", "violations", "provenance"] {
         assert!(seen["tables"][table].as_u64().unwrap() > 4, "{table}: {}", seen["tables"]);
     }
+}
+
+#[test]
+#[ignore = "needs chromium"]
+fn a_flight_shows_what_went_over_the_wire_and_when_plans_took_over() {
+    let room = flown("square8-detection");
+    let seen = visit(room.path(), "report.html", Screen { size: [1280, 900], dark: false });
+    assert!(seen["wire"].as_u64().unwrap() > 20, "{}", seen["wire"]);
+    assert_eq!(seen["takeovers"], true);
+    let (before, after) = (&seen["before"], &seen["after"]);
+    assert_ne!(before["picture"], after["picture"], "the track grows with the time");
+    let planned = planned("square8-energy");
+    let seen = visit(planned.path(), "report.html", Screen { size: [1280, 900], dark: false });
+    assert_eq!((&seen["wire"], &seen["takeovers"]), (&0.into(), &false.into()));
+}
+
+/// What a page holds, as it is sent.
+fn fetched(host: &str) -> String {
+    let mut stream = TcpStream::connect(host).unwrap();
+    write!(stream, "GET / HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
+}
+
+/// The live page, from a flight that goes on.
+#[test]
+#[ignore = "needs chromium"]
+fn a_flight_that_goes_on_moves_in_the_browser() {
+    let room = TempDir::new().unwrap();
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/square8-detection.toml");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_quietpath"));
+    command.current_dir(&room).arg("fly").arg(scenario).args(["--speedup", "4", "--view", "--out", "."]);
+    let mut flight = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut line = String::new();
+    BufReader::new(flight.stderr.take().unwrap()).read_line(&mut line).unwrap();
+    let address = line.split("http://").nth(1).expect("an address").trim();
+    // Before the vehicle flies there is a page that waits.
+    let host = address.trim_end_matches('/');
+    while !fetched(host).contains("data-live") {
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    let mut browser = Command::new("chromium");
+    browser.args(QUIET).args(["--enable-logging=stderr", "--timeout=6000", "--dump-dom"]);
+    browser.arg(format!("--user-data-dir={}", room.path().join("browser").display()));
+    let output = browser.arg(format!("http://{address}")).stdin(Stdio::null()).output().unwrap();
+    flight.kill().unwrap();
+    flight.wait().unwrap();
+    let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let complaints: Vec<&str> = log.lines().filter(|line| line.contains(":CONSOLE")).collect();
+    assert!(complaints.is_empty(), "{complaints:#?}");
+    let between = |from: &str, to: &str| dom.split_once(from).and_then(|(_, rest)| Some(rest.split_once(to)?.0));
+    let loaded: Value = serde_json::from_str(between("data-live=\"/events\">", "</script>").expect("data")).unwrap();
+    let loaded = loaded["time"][1].as_f64().unwrap();
+    let words = between("<output id=\"now\" for=\"slider\">", "</output>").expect("the time");
+    let shown: f64 = words.split_whitespace().next().unwrap().parse().unwrap();
+    assert!(shown > loaded + 2.0, "loaded at {loaded} s, shows {words}");
 }
 
 #[test]

@@ -111,13 +111,23 @@ fn check() -> Vec<Step> {
 fn test() -> Vec<Step> {
     let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
     let browser = "test --package quietpath-sim --test page -- --ignored";
-    let mut steps = vec![
-        Step::cargo("tests", "test --workspace"),
-        Step::cargo("other people's MAVLink", interoperate),
-        Step::cargo("the report in a browser", browser),
-    ];
+    let mut steps =
+        vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
+    steps.extend(chromium());
+    steps.push(Step::cargo("the report in a browser", browser));
     steps.extend(target());
     steps
+}
+
+/// Chromium, from the system's packages where it is missing; elsewhere the tests say what they need.
+fn chromium() -> Vec<Step> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let has = |program: &str| std::env::split_paths(&path).any(|folder| folder.join(program).is_file());
+    if has("chromium") || !has("apt-get") {
+        return Vec::new();
+    }
+    let install = "install -qq -y --no-install-recommends chromium";
+    vec![Step::new("packages listed", "apt-get", "update -qq"), Step::new("chromium installed", "apt-get", install)]
 }
 
 fn target() -> Vec<Step> {
@@ -141,7 +151,7 @@ fn pictures() -> Vec<Step> {
         Step::cargo(name, &arguments)
     };
     let study = "run --release -- study sim/scenarios/square8-detection.toml --out target/pictures/study";
-    let report = format!("run --release -- plan sim/scenarios/{REPORT}.toml --once --out target/pictures/{REPORT}");
+    let report = format!("run --release -- fly sim/scenarios/{REPORT}.toml --out target/pictures/{REPORT}");
     let mut steps: Vec<Step> = PICTURES.into_iter().map(plan).collect();
     steps.push(Step::cargo("study", study));
     steps.push(Step::cargo("report", &report));

@@ -17,14 +17,28 @@ class Charts {
     });
   }
 
-  /** Takes over new data. */
+  /** Takes over new data: in place where diagrams and lines are the same, so that the page does not jump. */
   reload() {
-    this.restyle();
+    const { panels } = this.data;
+    const fits = panels.length === this.plots.length && panels.every((panel, index) => panel.lines.length + 1 === this.plots[index].series.length);
+    if (!fits) {
+      this.restyle();
+      return;
+    }
+    panels.forEach((panel, index) => this.plots[index].setData(this.columns(panel)));
+    this.updateSoon();
+  }
+
+  /** The numbers of a diagram: times, and the values of each line. */
+  columns(panel) {
+    const second = this.data.clock[1];
+    const tables = panel.lines.map((line) => [line.times.map((at) => at / second), line.values]);
+    return tables.length > 1 ? uPlot.join(tables) : tables[0] || [[], []];
   }
 
   build() {
     this.figures = this.frames();
-    this.plots = this.data.panels.map((panel, index) => this.plot(panel, this.figures[index]));
+    this.plots = this.data.panels.map((panel, index) => this.plot(index, this.figures[index]));
     this.updateSoon();
   }
 
@@ -32,12 +46,13 @@ class Charts {
     return { width: Math.max(240, box.clientWidth), height: 170 };
   }
 
-  plot(panel, box) {
+  plot(index, box) {
     const theme = colours();
-    const { clock, time, agents } = this.data;
+    const { clock, agents } = this.data;
     const [unit, second] = clock;
-    const tables = panel.lines.map((line) => [line.times.map((at) => at / second), line.values]);
-    const [times, ...values] = tables.length > 1 ? uPlot.join(tables) : tables[0] || [[], []];
+    const panel = this.data.panels[index];
+    // New data has new ranges.
+    const now = () => this.data.panels[index] ?? panel;
     const axis = { stroke: theme.ink, grid: { stroke: theme.line, width: 1 }, ticks: { stroke: theme.line } };
     const few = panel.log ? { splits: decades, filter: (plot, ticks) => ticks } : {};
     const several = agents.length > 1;
@@ -47,8 +62,8 @@ class Charts {
       cursor: { y: false, drag: { x: false, y: false, setScale: false }, bind: { mouseleave: () => null, dblclick: () => null } },
       legend: { live: true, markers: { fill: (plot, index) => plot.series[index].stroke(plot, index) } },
       scales: {
-        x: { time: false, range: () => time.map((at) => at / second) },
-        y: { distr: panel.log ? 3 : 1, range: () => [panel.low, panel.high] },
+        x: { time: false, range: () => this.data.time.map((at) => at / second) },
+        y: { distr: panel.log ? 3 : 1, range: () => [now().low, now().high] },
       },
       axes: [
         { ...axis, label: `time (${unit})`, labelSize: 20, size: 30 },
@@ -60,16 +75,17 @@ class Charts {
       series: [
         { label: `time (${unit})`, value: (plot, value) => (value === null ? '\u2013' : value.toFixed(second > 1 ? 2 : 1)) },
         ...panel.lines.map((line) => ({
-          label: several ? agents[line.agent].name : panel.unit || 'value',
+          label: agents[line.agent].name,
           stroke: () => tint(agents[line.agent].colour),
           width: 2, dash: DASHES[line.agent % DASHES.length], spanGaps: several, points: { show: false },
           value: (plot, value) => figure(value),
         })),
       ],
       hooks: {
-        draw: [(plot) => panel.bounds.forEach(([value, words]) => bound(plot, value, words))],
+        drawClear: [(plot) => takeovers(this.data).forEach((time) => takeover(plot, time / second))],
+        draw: [(plot) => now().bounds.forEach(([value, words]) => bound(plot, value, words))],
       },
-    }, [times, ...values], box);
+    }, this.columns(panel), box);
     pointed(chart, (left) => this.moment.set(chart.posToVal(left, 'x') * second, chart));
     return chart;
   }
@@ -98,6 +114,28 @@ class Charts {
     this.element.replaceChildren();
     this.build();
   }
+}
+
+/** When a new plan took over from another, s. */
+function takeovers(data) {
+  return data.paths.filter((path) => path.kind === 'step' && path.agent === 0).map((path) => path.times[0]).slice(1);
+}
+
+/** A dotted line where a new plan took over. */
+function takeover(plot, time) {
+  const { ctx, bbox } = plot;
+  const dot = window.devicePixelRatio || 1;
+  const x = plot.valToPos(time, 'x', true);
+  ctx.save();
+  ctx.strokeStyle = colours().ink;
+  ctx.globalAlpha = 0.45;
+  ctx.lineWidth = dot;
+  ctx.setLineDash([dot, 3 * dot]);
+  ctx.beginPath();
+  ctx.moveTo(x, bbox.top);
+  ctx.lineTo(x, bbox.top + bbox.height);
+  ctx.stroke();
+  ctx.restore();
 }
 
 /** A dashed limit with its name. */

@@ -232,7 +232,7 @@ class FlightMap {
     const pen = new Pen(plot);
     this.regions(pen);
     const { time } = this.moment;
-    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.route(pen, path, { width: 1.4, alpha: this.inForce(path) ? 1 : 0.45, dash: [5, 4] });
+    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.route(pen, path, { width: 1.4, alpha: this.inForce(path) ? 1 : 0.45, dash: [5, 4], emits: false });
     const main = this.data.paths.filter((path) => path.kind !== 'step');
     for (const path of main) {
       const flown = path.kind === 'flown';
@@ -253,10 +253,11 @@ class FlightMap {
     return path.times[0] <= time && !later;
   }
 
-  route(pen, path, { width, alpha, dash = [], marks = false, until = Infinity }) {
+  route(pen, path, { width, alpha, dash = [], marks = false, emits = true, until = Infinity }) {
     const points = path.x.map((x, node) => pen.at(x, path.y[node])).filter((_, node) => path.times[node] <= until);
     const { colour } = this.data.agents[path.agent];
-    const legs = (wanted) => points.slice(1).map((to, index) => [points[index], to, index + 1]).filter(([, , node]) => wanted(node));
+    // Many plans would bury the map under what they want to emit: what flies shows it.
+    const legs = (wanted) => (emits ? points.slice(1).map((to, index) => [points[index], to, index + 1]).filter(([, , node]) => wanted(node)) : []);
     pen.context.globalAlpha = 0.6 * alpha;
     for (const [a, b, node] of legs((node) => path.jam[node] > FAINTEST)) pen.line([a, b], '#fff3a6', 6 + (14 * path.jam[node]) / this.loudest);
     pen.context.globalAlpha = alpha;

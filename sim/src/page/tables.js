@@ -36,6 +36,7 @@ function tables(data) {
   table('violations', ['constraint', 'violation'], data.violations.map(([name, size]) => [name.replace('_', ' '), number(size)]));
   table('provenance', [], data.provenance);
   document.getElementById('scenario').textContent = data.scenario;
+  document.getElementById('takeovers').hidden = takeovers(data).length === 0;
   const section = document.getElementById('wire-section');
   section.hidden = data.wire.length === 0;
   table('wire', ['time (s)', 'way', 'message', 'content'], data.wire.map((row) => [number(row.time.toFixed(2)), row.way, row.name, row.content]));
