@@ -232,11 +232,11 @@ class FlightMap {
     const pen = new Pen(plot);
     this.regions(pen);
     const { time } = this.moment;
-    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.route(pen, path, { width: 1.4, alpha: this.inForce(path) ? 1 : 0.45, dash: [5, 4], emits: false });
+    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.step(pen, path);
     const main = this.data.paths.filter((path) => path.kind !== 'step');
     for (const path of main) {
       const flown = path.kind === 'flown';
-      this.route(pen, path, { width: 3.2, alpha: 1, marks: true, dash: DASHES[path.agent % DASHES.length], until: flown ? time : Infinity });
+      this.route(pen, path, DASHES[path.agent % DASHES.length], flown ? time : Infinity);
     }
     this.sensors(pen);
     for (const path of main) {
@@ -253,25 +253,33 @@ class FlightMap {
     return path.times[0] <= time && !later;
   }
 
-  route(pen, path, { width, alpha, dash = [], marks = false, emits = true, until = Infinity }) {
+  /** The plan of a step: thin, and bright while it flies. Emissions and rims of many would bury the map. */
+  step(pen, path) {
+    const points = path.x.map((x, node) => pen.at(x, path.y[node]));
+    const flies = this.inForce(path);
+    if (flies) pen.line(points, 'rgba(255,255,255,0.9)', 3.8);
+    pen.context.globalAlpha = flies ? 1 : 0.4;
+    pen.line(points, this.data.agents[path.agent].colour, flies ? 1.8 : 1.1, [5, 4]);
+    pen.context.globalAlpha = 1;
+  }
+
+  route(pen, path, dash, until) {
     const points = path.x.map((x, node) => pen.at(x, path.y[node])).filter((_, node) => path.times[node] <= until);
     const { colour } = this.data.agents[path.agent];
-    // Many plans would bury the map under what they want to emit: what flies shows it.
-    const legs = (wanted) => (emits ? points.slice(1).map((to, index) => [points[index], to, index + 1]).filter(([, , node]) => wanted(node)) : []);
-    pen.context.globalAlpha = 0.6 * alpha;
+    const legs = (wanted) => points.slice(1).map((to, index) => [points[index], to, index + 1]).filter(([, , node]) => wanted(node));
+    pen.context.globalAlpha = 0.6;
     for (const [a, b, node] of legs((node) => path.jam[node] > FAINTEST)) pen.line([a, b], '#fff3a6', 6 + (14 * path.jam[node]) / this.loudest);
-    pen.context.globalAlpha = alpha;
-    pen.line(points, 'rgba(255,255,255,0.9)', width + 2.4);
-    pen.line(points, colour, width, dash);
+    pen.context.globalAlpha = 1;
+    pen.line(points, 'rgba(255,255,255,0.9)', 5.6);
+    pen.line(points, colour, 3.2, dash);
     for (const rim of [[8.6, '#ffffff'], [6.4, colour], [2.6, '#ffffff']]) {
       for (const [a, b] of legs((node) => path.dropout[node] >= 0.5)) pen.line([a, b], rim[1], rim[0]);
     }
-    if (marks && path.x.length) {
+    if (path.x.length) {
       const end = path.x.length - 1;
       pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
       pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
     }
-    pen.context.globalAlpha = 1;
   }
 
   regions(pen) {
