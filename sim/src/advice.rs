@@ -9,7 +9,7 @@
 //! | sensors | what each alone makes of the metrics that are asked for, anywhere in the domain |
 //! | landscape | how much the first metric differs from place to place |
 //!
-//! Limits: the grid has [`CELLS`] cells along the longer side, so that a gap narrower than one may be missed; sensors are
+//! Limits: the grid has `CELLS` cells along the longer side, so that a gap narrower than one may be missed; sensors are
 //! looked at where they are at the start and at the end.
 
 use std::fmt::Write as _;

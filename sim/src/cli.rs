@@ -264,7 +264,7 @@ pub struct ReportArgs {
 /// Arguments of `quietpath study`.
 #[derive(Debug, Args)]
 pub struct StudyArgs {
-    /// Scenario file with a [study]; `-` reads it from standard input
+    /// Scenario file with `[study]`; `-` reads it from standard input
     pub scenario: String,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]

@@ -12,7 +12,7 @@
 //! | separation | least distance between two agents, between nodes too | `separation` | m |
 //!
 //! These are for reading. Whether a plan is feasible is the core's to say, relative to scales of its own: see
-//! [`quietpath_core::constraints`]. Limits: circles count as polygons of [`CORNERS`] corners.
+//! [`quietpath_core::constraints`]. Limits: circles count as polygons of `CORNERS` corners.
 
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::scenario::{AgentEntry, RegionEntry};

@@ -3,7 +3,7 @@
 //! A stream is a message that says where something is, or that somebody is there, many times a second. Commands to payloads
 //! are repeated too: those that say something new have a line of their own, the rest is counted.
 //!
-//! Limits: [`LINES_MAX`] lines; what comes later is counted.
+//! Limits: `LINES_MAX` lines; what comes later is counted.
 
 use std::collections::BTreeMap;
 
