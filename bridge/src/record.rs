@@ -274,15 +274,110 @@ pub struct Replayed {
     pub ending: Ending,
 }
 
-/// A line of a record, without its end; `None` behind the last. Whether it has an end comes with it.
-fn line(file: &mut impl BufRead) -> io::Result<Option<(Vec<u8>, bool)>> {
-    let mut bytes = Vec::new();
-    let count = file.by_ref().take(LINE_MAX as u64).read_until(b'\n', &mut bytes)?;
-    if count >= LINE_MAX && bytes.last() != Some(&b'\n') {
+/// Reads a record, line by line as it is written, and feeds it to a flight.
+pub struct Reader {
+    name: String,
+    lines: BufReader<File>,
+    /// The line that is being read: a record that grows may end in the middle of one.
+    line: Vec<u8>,
+    number: usize,
+    scenario: ScenarioFile,
+    flight: Flight,
+}
+
+/// A line of a record, fed to the flight.
+#[derive(Clone, Debug)]
+pub struct Fed {
+    /// Time of the input.
+    pub time: Time,
+    /// The input.
+    pub input: Input,
+    /// What came out of it now.
+    pub outputs: Vec<Output>,
+    /// What came out of it then, as text.
+    recorded: Vec<String>,
+}
+
+const RECORD: &str = "give the file that `quietpath-bridge run --record` wrote";
+
+/// Reads on in a line; true where it is whole.
+fn read_line(file: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
+    let left = LINE_MAX.saturating_sub(line.len());
+    let count = file.by_ref().take(left as u64).read_until(b'\n', line)?;
+    let is_whole = line.last() == Some(&b'\n');
+    if count >= left && !is_whole {
         return Err(io::Error::new(io::ErrorKind::InvalidData, format!("it has more than {LINE_MAX} bytes")));
     }
-    let is_whole = bytes.pop_if(|byte| *byte == b'\n').is_some();
-    Ok((count > 0).then_some((bytes, is_whole)))
+    Ok(is_whole)
+}
+
+impl Reader {
+    /// Opens a record, and makes the flight that it is of.
+    ///
+    /// # Errors
+    /// A file that is no record.
+    pub fn open(path: &Path) -> Result<Self, Box<FileError>> {
+        let name = path.display().to_string();
+        let fail = |message: String, help: &str| Box::new(FileError::whole(&format!("{name}:1"), message, help));
+        let unreadable = |error: io::Error| fail(format!("cannot be read: {error}"), RECORD);
+        let mut lines = BufReader::new(File::open(path).map_err(unreadable)?);
+        let mut first = Vec::new();
+        let is_whole = read_line(&mut lines, &mut first).map_err(unreadable)?;
+        let header: Header = serde_json::from_slice(&first).map_err(|error| match error.is_eof() && !is_whole {
+            true => fail("ends before the flight begins".into(), "the program was killed at once: nothing is lost"),
+            false => fail(format!("is no record: {error}"), RECORD),
+        })?;
+        if header.quietpath_record != VERSION {
+            let version = header.quietpath_record;
+            let message = format!("is a record of version {version}, and this program reads {VERSION}");
+            return Err(fail(message, "replay it with the program that wrote it"));
+        }
+        let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
+        let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
+        if let Some(journal) = header.journal {
+            let misfit = |why| fail(format!("holds a journal that does not fit: {why}"), RECORD);
+            flight = flight.resuming(journal).map_err(misfit)?;
+        }
+        Ok(Self { name, lines, line: Vec::new(), number: 1, scenario, flight })
+    }
+
+    /// The scenario that the flight began with.
+    #[must_use]
+    pub const fn scenario(&self) -> &ScenarioFile {
+        &self.scenario
+    }
+
+    /// The flight, as it is after the lines that have been read.
+    #[must_use]
+    pub const fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// Where the record ends, as far as it was read.
+    #[must_use]
+    pub const fn ending(&self) -> Ending {
+        if self.line.is_empty() { Ending::Whole } else { Ending::Cut { line: self.number + 1 } }
+    }
+
+    /// Feeds the next line; `None` where there is none yet, or the last one is not complete.
+    ///
+    /// # Errors
+    /// A line that cannot be read.
+    pub fn feed(&mut self) -> Result<Option<Fed>, Box<FileError>> {
+        let number = self.number + 1;
+        let name = &self.name;
+        let fail = |message: String| Box::new(FileError::whole(&format!("{name}:{number}"), message, RECORD));
+        let is_whole = read_line(&mut self.lines, &mut self.line);
+        if !is_whole.map_err(|error| fail(format!("cannot be read: {error}")))? {
+            return Ok(None);
+        }
+        let parsed: Line = serde_json::from_slice(&self.line).map_err(|error| fail(format!("is broken: {error}")))?;
+        let input = parsed.input.and_then(Written::into_input).ok_or_else(|| fail("holds no input".into()))?;
+        self.line.clear();
+        self.number = number;
+        let outputs = self.flight.step(parsed.t, input.clone());
+        Ok(Some(Fed { time: parsed.t, input, outputs, recorded: parsed.output.unwrap_or_default() }))
+    }
 }
 
 /// Feeds a record to a new flight; `each` gets every input's time and outputs. A record that was cut off is replayed as
@@ -291,52 +386,21 @@ fn line(file: &mut impl BufRead) -> io::Result<Option<(Vec<u8>, bool)>> {
 /// # Errors
 /// A file that is no record; the first line whose outputs differ, with both.
 pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Replayed, Box<FileError>> {
-    let name = path.display().to_string();
-    let fail = |line: usize, message: String, help: &str| {
-        Box::new(FileError::whole(&format!("{name}:{line}"), message, help))
-    };
-    let record = "give the file that `quietpath-bridge run --record` wrote";
-    let file = File::open(path).map_err(|error| fail(1, format!("cannot be read: {error}"), record))?;
-    let mut file = BufReader::new(file);
-    let unreadable = |number: usize, error: &io::Error| fail(number, format!("cannot be read: {error}"), record);
-    let (first, is_whole) = line(&mut file).map_err(|error| unreadable(1, &error))?.unwrap_or_default();
-    let header: Header = serde_json::from_slice(&first).map_err(|error| match error.is_eof() && !is_whole {
-        true => fail(1, "ends before the flight begins".into(), "the program was killed at once: nothing is lost"),
-        false => fail(1, format!("is no record: {error}"), record),
-    })?;
-    if header.quietpath_record != VERSION {
-        let message = format!("is a record of version {}, and this program reads {VERSION}", header.quietpath_record);
-        return Err(fail(1, message, "replay it with the program that wrote it"));
-    }
-    let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
-    let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
-    if let Some(journal) = header.journal {
-        flight = flight.resuming(journal).map_err(|why| fail(1, format!("holds a journal that does not fit: {why}"), record))?;
-    }
+    let mut reader = Reader::open(path)?;
     let mut replayed = Replayed { inputs: 0, outputs: 0, last: Time::ZERO, ending: Ending::Whole };
-    for number in 2.. {
-        let Some((text, is_whole)) = line(&mut file).map_err(|error| unreadable(number, &error))? else { break };
-        let parsed: Result<Line, _> = serde_json::from_slice(&text);
-        let Line { t, input, output } = match parsed {
-            Ok(line) => line,
-            Err(_) if !is_whole => {
-                replayed.ending = Ending::Cut { line: number };
-                break;
-            }
-            Err(error) => return Err(fail(number, format!("is broken: {error}"), record)),
-        };
-        let input =
-            input.and_then(Written::into_input).ok_or_else(|| fail(number, "holds no input".into(), record))?;
-        let outputs: Vec<String> = flight.step(t, input).iter().map(written).collect();
-        let recorded = output.unwrap_or_default();
+    while let Some(Fed { time, outputs, recorded, .. }) = reader.feed()? {
+        let outputs: Vec<String> = outputs.iter().map(written).collect();
         if outputs != recorded {
             let message = format!("came out differently\n  then {recorded:?}\n  now  {outputs:?}");
-            return Err(fail(number, message, "the program is another one than the one that flew"));
+            let (place, help) =
+                (format!("{}:{}", reader.name, reader.number), "the program is another one than the one that flew");
+            return Err(Box::new(FileError::whole(&place, message, help)));
         }
         replayed.inputs += 1;
         replayed.outputs += outputs.len();
-        replayed.last = t;
-        each(t, &outputs);
+        replayed.last = time;
+        each(time, &outputs);
     }
+    replayed.ending = reader.ending();
     Ok(replayed)
 }
