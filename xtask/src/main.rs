@@ -99,9 +99,11 @@ fn run(command: &Command) -> anyhow::Result<bool> {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in a folder of the repository")?;
     let steps = match command {
         Command::Bench { arguments } => vec![bench(arguments)],
-        Command::Live => {
-            vec![Step::cargo("the bridge in flight", "run --release --package quietpath-tests --bin live")]
-        }
+        Command::Live => vec![
+            // As the measurement itself builds the programs that it starts.
+            Step::cargo("the programs", "build --workspace --bins --release"),
+            Step::new("the bridge in flight", "target/release/live", "page"),
+        ],
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],

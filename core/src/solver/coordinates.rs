@@ -49,10 +49,11 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
     /// Makes the ends zero, which a problem with other intervals may have left otherwise.
     pub(super) fn pin_ends(&mut self, intervals: usize) {
         for nodes in &mut self.offset {
-            for end in [0, intervals] {
-                if let Some(offset) = nodes.get_mut(end) {
-                    *offset = Point::zeros();
-                }
+            if let Some(first) = nodes.first_mut() {
+                *first = Point::zeros();
+            }
+            if let Some(last) = nodes.get_mut(intervals) {
+                *last = Point::zeros();
             }
         }
     }
