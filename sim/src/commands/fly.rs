@@ -125,8 +125,9 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
 fn line(progress: &Progress, unit_m: f64) -> String {
     let time = progress.time.map_or_else(|| "before the start".into(), units::duration);
     let place: Vec<String> = progress.position.iter().take(2).map(|part| units::length(part * unit_m)).collect();
+    let who = progress.agent.as_ref().map(|name| format!("{name} ")).unwrap_or_default();
     format!(
-        "{} | {time} | {} | detection {:.3}, peak {:.3} | {} plans in flight | {} frames out, {} in, {:.1} % lost",
+        "{who}{} | {time} | {} | detection {:.3}, peak {:.3} | {} plans in flight | {} frames out, {} in, {:.1} % lost",
         progress.phase,
         place.join(" east, ") + " north",
         progress.detection,

@@ -8,10 +8,11 @@ use quietpath_bridge::clock::Time;
 use quietpath_bridge::flight::{End, Flight, Input, Level, Output};
 use quietpath_bridge::frame::Place;
 use quietpath_bridge::link::Statistics;
+use quietpath_bridge::payload::Emission;
 use quietpath_bridge::record::Reader;
 use quietpath_bridge::replan::Observation;
 
-use super::craft::Craft;
+use super::craft::{Craft, SILENT};
 use super::watch::Watch;
 use super::{Look, TELL, signals};
 use crate::outcome::Failure;
@@ -29,7 +30,8 @@ const LINES_MAX: usize = 4000;
 pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>) -> Result<(), Failure> {
     let mut craft = Recorded::open(record)?;
     let (scenario, plan) = (craft.reader.scenario().clone(), craft.flight().plan().clone());
-    let mut watch = Watch::new(&scenario, &plan)?;
+    let agent = scenario.agents.iter().position(|agent| agent.name == craft.flight().agent()).unwrap_or_default();
+    let mut watch = Watch::new(&scenario, &plan, agent)?;
     let signalled = signals()?;
     let mut told: Option<Instant> = None;
     let mut is_news = true;
@@ -44,7 +46,7 @@ pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failur
         }
         if is_news && told.is_none_or(|told| told.elapsed() >= TELL) {
             (told, is_news) = (Some(Instant::now()), false);
-            watch.look_on(&craft, &mut tell)?;
+            watch.look_on(&craft, &[], &mut tell)?;
         }
         if craft.has_caught_up {
             std::thread::sleep(PAUSE);
@@ -117,8 +119,8 @@ impl Craft for Recorded {
         self.flight().vehicle().and_then(|vehicle| vehicle.fix).map(|fix| fix.place)
     }
 
-    fn levels(&self) -> [f64; 2] {
-        self.flight().emission().map_or([0.0; 2], |emission| [emission.level, emission.dropout])
+    fn emission(&self) -> Emission {
+        self.flight().emission().unwrap_or(SILENT)
     }
 
     fn statistics(&self) -> Statistics {
