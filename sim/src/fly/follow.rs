@@ -1,5 +1,7 @@
 //! A flight of another program, followed by the record that it writes.
 
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -23,16 +25,22 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Lines that are read in one go.
 const LINES_MAX: usize = 4000;
 
-/// Follows the record of a flight until a signal comes; `tell` hears of what is new.
+/// Follows the record of a flight until a signal comes; `tell` hears of what is new. A record that has not begun is waited for.
 ///
 /// # Errors
 /// A file that is no record, a line that cannot be read, what `tell` fails with.
 pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>) -> Result<(), Failure> {
+    let signalled = signals()?;
+    while !has_begun(record) {
+        if signalled.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        std::thread::sleep(PAUSE);
+    }
     let mut craft = Recorded::open(record)?;
     let (scenario, plan) = (craft.reader.scenario().clone(), craft.flight().plan().clone());
     let agent = scenario.agents.iter().position(|agent| agent.name == craft.flight().agent()).unwrap_or_default();
     let mut watch = Watch::new(&scenario, &plan, agent)?;
-    let signalled = signals()?;
     let mut told: Option<Instant> = None;
     let mut is_news = true;
     while !signalled.load(Ordering::Relaxed) {
@@ -53,6 +61,13 @@ pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failur
         }
     }
     Ok(())
+}
+
+/// Whether the first line of a record is complete.
+fn has_begun(record: &Path) -> bool {
+    let mut line = Vec::new();
+    let read = File::open(record).and_then(|file| BufReader::new(file).read_until(b'\n', &mut line));
+    read.is_ok() && line.ends_with(b"\n")
 }
 
 /// A flight as its record tells it.
