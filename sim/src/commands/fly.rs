@@ -126,15 +126,14 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
 /// Progress in a few words: step, time, position, detection, link.
 fn words(progress: &Progress, unit_m: f64) -> String {
     let who = progress.agent.as_ref().map(|name| format!("{name}, ")).unwrap_or_default();
-    let time = progress.time.map_or_else(|| progress.phase.to_owned(), units::duration);
+    let time = progress.time.map_or_else(|| progress.phase.to_owned(), |time| format!("{time:.0} s"));
     let place: Vec<String> = progress.position.iter().take(2).map(|part| units::length(part * unit_m)).collect();
     format!(
-        "{who}plan {}, {time}, {} north, detection {:.3} (peak {:.3}), {} frames, {:.1} % lost",
+        "{who}plan {}, {time}, {} north, detection {:.3}, peak {:.3}, {:.1} % lost",
         progress.replans + 1,
         place.join(" east "),
         progress.detection,
         progress.peak,
-        progress.frames.iter().sum::<u64>(),
         100.0 * progress.loss,
     )
 }
