@@ -81,8 +81,11 @@ fn sensor() -> impl Strategy<Value = Sensor<'static, f64, 2>> {
         (1e-3..0.1, 0.0..1.0, 1.0..4.0).prop_map(|(c1, c2, path_loss)| Ranging::Toa { c1, c2, path_loss }),
     ];
     let detection = prop_oneof![
-        (0.1..2.0, 0.1..1.0, 1.0..4.0)
-            .prop_map(|(scale, epsilon, path_loss)| Detection::Proxy { scale, epsilon, path_loss }),
+        (0.1..2.0, 0.1..1.0, 1.0..4.0).prop_map(|(scale, epsilon, path_loss)| Detection::Proxy {
+            scale,
+            epsilon,
+            path_loss
+        }),
         (1..2000_u32, 0.1..10.0, 0.1..2.0, -1.0..1.0, 1.0..3.0).prop_map(
             |(samples, signal, noise, log_threshold, path_loss)| Detection::Energy {
                 samples,
@@ -127,8 +130,14 @@ fn problem() -> impl Strategy<Value = Problem> {
             dropout: Some(Dropout { budget: 10.0 }),
         };
         let sense = if metric == Metric::Detection { Sense::Minimize } else { Sense::Maximize };
-        let term =
-            Term { metric, sense, reduce: Reduce::Integral, weight: 1.0, agents: AgentSet::ALL, window: Window::always() };
+        let term = Term {
+            metric,
+            sense,
+            reduce: Reduce::Integral,
+            weight: 1.0,
+            agents: AgentSet::ALL,
+            window: Window::always(),
+        };
         let time_max = norm(&(goal - start)).max(1.0) / agent.speed_max * slack;
         Problem { agent, sensors, term, time_max }
     })

@@ -8,9 +8,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use quietpath_bridge::clock::Time;
 use quietpath_bridge::command::{Command, Commands, Outcome};
-use quietpath_bridge::link::dialect::{
-    COMMAND_ACK_DATA, MavCmd, MavFrame, MavMessage, MavResult, PARAM_VALUE_DATA,
-};
+use quietpath_bridge::link::dialect::{COMMAND_ACK_DATA, MavCmd, MavFrame, MavMessage, MavResult, PARAM_VALUE_DATA};
 use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::mission::item::first_difference;
 use quietpath_bridge::mission::{Delivered, Delivery, Download, Failure, Item, List, Pace, Talk};

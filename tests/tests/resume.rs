@@ -93,7 +93,11 @@ fn without_a_journal_a_running_mission_is_left_alone_and_another_mode_too() {
     let kept = world.journal.take();
     let mut world = restarted(world, settings(FlyMode::Mission));
     world.pass(3.0);
-    assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("flies a mission already")), "{:?}", world.end);
+    assert!(
+        matches!(&world.end, Some(End::Failed(why)) if why.contains("flies a mission already")),
+        "{:?}",
+        world.end
+    );
     world.journal = kept;
     world.mode(Mode::Hold);
     let mut world = restarted(world, settings(FlyMode::Mission));
@@ -148,7 +152,10 @@ fn budgets_count_over_all_plans_and_over_a_restart() {
         }
         let job = world.jobs.last().expect("a job").clone();
         budgets.push(budget(&world).expect("a jammer"));
-        world.input(quietpath_bridge::flight::Input::Planned(Answer { number: job.number, result: Ok((job.tail, true)) }));
+        world.input(quietpath_bridge::flight::Input::Planned(Answer {
+            number: job.number,
+            result: Ok((job.tail, true)),
+        }));
         world.pass(3.0);
     }
     // The plan jams with 0.5 from node 5 to node 14, 2 s each, of a budget of 20 s.

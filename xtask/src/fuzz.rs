@@ -73,9 +73,8 @@ fn run(target: &str, seconds: u64, top: &Path) -> anyhow::Result<Run> {
     let output = Command::new("rustup").args(&arguments).current_dir(top).stdout(Stdio::inherit()).output();
     let output = output.context(missing)?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let figure = |name: &str| -> Option<u64> {
-        said.lines().find_map(|line| line.strip_prefix(name)?.trim().parse().ok())
-    };
+    let figure =
+        |name: &str| -> Option<u64> { said.lines().find_map(|line| line.strip_prefix(name)?.trim().parse().ok()) };
     let Some(inputs) = figure("stat::number_of_executed_units:") else {
         bail!("{target} did not run; {missing}\n{said}");
     };

@@ -356,9 +356,7 @@ impl Flight {
     fn scenario_time(&self) -> f64 {
         match (self.settings.mode, self.zero) {
             (_, None) => self.flying.curve.begin(),
-            (FlyMode::Guided, Some(zero)) => {
-                self.world.start_time + self.passed + self.now.since(zero).as_secs_f64()
-            }
+            (FlyMode::Guided, Some(zero)) => self.world.start_time + self.passed + self.now.since(zero).as_secs_f64(),
             (FlyMode::Mission, Some(_)) => self.mission_time(),
         }
     }

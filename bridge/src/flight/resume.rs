@@ -135,7 +135,8 @@ impl Flight {
             return self.begin_delivery(vehicle);
         }
         if vehicle.mode != self.own_mode() {
-            let why = format!("in flight, and the mode is {:?}: the bridge does not take the vehicle back", vehicle.mode);
+            let why =
+                format!("in flight, and the mode is {:?}: the bridge does not take the vehicle back", vehicle.mode);
             return self.end(End::Released(why));
         }
         self.set_budgets((journal.jam_left, journal.dropout_left));

@@ -344,11 +344,19 @@ mod tests {
                 "is uncertain by 0.775, more than 0.5",
             ),
             (
-                format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"detection\": {{\"model\": \"proxy\", \"scale\": -1, \"epsilon\": 1, \"path_loss\": 2}}}}"),
+                format!(
+                    "{{\"id\": \"{name}\", \"position\": [1, 2], \"detection\": {{\"model\": \"proxy\", \"scale\": -1, \"epsilon\": 1, \"path_loss\": 2}}}}"
+                ),
                 "makes no sensor: detection.scale",
             ),
-            (format!("{{\"id\": \"{name}\", \"time\": 1e300, \"position\": [1, 2], \"velocity\": [1, 0]}}"), "makes no sensor: track"),
-            (format!("{{\"id\": \"{name}\", \"position\": [1e308, 2], \"velocity\": [1e308, 0]}}"), "makes no sensor: track"),
+            (
+                format!("{{\"id\": \"{name}\", \"time\": 1e300, \"position\": [1, 2], \"velocity\": [1, 0]}}"),
+                "makes no sensor: track",
+            ),
+            (
+                format!("{{\"id\": \"{name}\", \"position\": [1e308, 2], \"velocity\": [1e308, 0]}}"),
+                "makes no sensor: track",
+            ),
             (
                 format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[1], []]}}"),
                 "covariance that is none",

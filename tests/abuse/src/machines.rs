@@ -84,11 +84,7 @@ fn heartbeat(dice: &mut Dice<'_>) -> HEARTBEAT_DATA {
     HEARTBEAT_DATA {
         custom_mode: dice.of(&modes).unwrap_or_default(),
         mavtype: MavType::MAV_TYPE_QUADROTOR,
-        autopilot: if is_px4 {
-            MavAutopilot::MAV_AUTOPILOT_PX4
-        } else {
-            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA
-        },
+        autopilot: if is_px4 { MavAutopilot::MAV_AUTOPILOT_PX4 } else { MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA },
         base_mode: dice.of(&flags).unwrap_or_default(),
         system_status: MavState::MAV_STATE_ACTIVE,
         mavlink_version: 3,
@@ -307,7 +303,8 @@ fn flight(dice: &mut Dice<'_>) {
             let Output::Send(message) = output else { continue };
             assert!(!radiates(message) || is_armed, "jams, and nobody armed it");
             assert!(
-                !radiates(message) || flight.phase() == "fly" && flight.vehicle().is_some_and(|vehicle| vehicle.armed),
+                !radiates(message)
+                    || flight.phase() == "fly" && flight.vehicle().is_some_and(|vehicle| vehicle.armed),
                 "jams while it does not fly the plan"
             );
             if let MavMessage::SET_POSITION_TARGET_GLOBAL_INT(data) = &**message {

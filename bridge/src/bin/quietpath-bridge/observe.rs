@@ -54,9 +54,7 @@ impl Observations {
                     let help = "a file is protected by its permissions: leave the key out";
                     return Err(format!("--observations-key: {source} is no udp:HOST:PORT\n  help: {help}"));
                 }
-                None => {
-                    Source::Grows { path: source.into(), file: None, rest: Vec::new(), is_skipping: false }
-                }
+                None => Source::Grows { path: source.into(), file: None, rest: Vec::new(), is_skipping: false },
             },
         };
         Ok(Self { source, waiting: VecDeque::new(), dropped: 0 })
@@ -109,7 +107,12 @@ fn take(text: &[u8], waiting: &mut VecDeque<Result<String, String>>) {
 
 /// The whole lines that a file has grown by; `rest` keeps the one that is not whole yet. A line that is too long is
 /// skipped to its end.
-fn grown(file: &mut File, rest: &mut Vec<u8>, is_skipping: &mut bool, waiting: &mut VecDeque<Result<String, String>>) {
+fn grown(
+    file: &mut File,
+    rest: &mut Vec<u8>,
+    is_skipping: &mut bool,
+    waiting: &mut VecDeque<Result<String, String>>,
+) {
     let mut more = vec![0; LINE_MAX];
     let count = file.read(&mut more).unwrap_or(0);
     rest.extend(more.iter().take(count));

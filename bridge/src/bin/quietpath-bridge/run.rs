@@ -84,9 +84,8 @@ impl Loop {
         let config = Config::read(&args.link)?.with_files(&args.files).with_run(args);
         let (scenario, plan) = config.load()?;
         let settings = config.flight.clone();
-        let new = || {
-            Flight::new(&scenario, &plan, settings.clone()).map_err(|error| Outcome::Input(error.to_string()))
-        };
+        let new =
+            || Flight::new(&scenario, &plan, settings.clone()).map_err(|error| Outcome::Input(error.to_string()));
         let state = State::new(config.state.clone());
         let (flight, journal) = match state.read() {
             None => (new()?, None),
@@ -129,8 +128,7 @@ impl Loop {
         }
         let link = config.open(clock)?;
         let (status, status_log) = (Time::ZERO, Time::ZERO);
-        let around =
-            Self { link, clock, observations, worker, recorder, state, stop, status, status_log, end: None };
+        let around = Self { link, clock, observations, worker, recorder, state, stop, status, status_log, end: None };
         Ok((flight, around))
     }
 

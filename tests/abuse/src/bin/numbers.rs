@@ -96,7 +96,8 @@ fn page(tallies: &[Tally], arguments: &Arguments) -> String {
         "---|".repeat(RESULTS.len())
     );
     for (kind, tally) in KINDS.iter().zip(tallies) {
-        let results = RESULTS.map(|name| tally.results.get(name).copied().unwrap_or_default().to_string()).join(" | ");
+        let results =
+            RESULTS.map(|name| tally.results.get(name).copied().unwrap_or_default().to_string()).join(" | ");
         let (straight, broken) = (tally.straight, tally.broken.len());
         let _ = writeln!(out, "| {kind} | {} | {results} | {straight} | {broken} |", tally.problems);
     }

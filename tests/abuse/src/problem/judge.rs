@@ -187,7 +187,9 @@ pub fn roll<T: Real, const DIM: usize>(
             let before = is_finite(flight.tail());
             let time = flight.tail().start_time() + dice.real(0.0, 30.0);
             if flight.resume(time, &states).is_ok() && before && !is_finite(flight.tail()) {
-                return Err(Broken(format!("finite states at {time:?} bend the tail out of all numbers: {states:?}")));
+                return Err(Broken(format!(
+                    "finite states at {time:?} bend the tail out of all numbers: {states:?}"
+                )));
             }
         } else {
             flight.fly(1 + dice.below(4));
