@@ -131,10 +131,12 @@ pub fn latencies(count: usize) -> Latencies {
     let (observations, config) = (format!("udp:127.0.0.1:{tracker}"), folder.path("bridge.toml"));
     let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
     let seconds = 25.0 + 0.25 * count as f64;
+    // Before the vehicle's time begins.
+    let program = built("quietpath-bridge");
     let flying = vehicle(&folder, port, seconds);
     let arguments = ["run", "--config", &config, "--link", &link, "--scenario", &scenario, "--plan", &plan];
     let more = ["--observations", &observations, "--record", &record];
-    let mut bridge = start(&built("quietpath-bridge"), &[&arguments[..], &more].concat());
+    let mut bridge = start(&program, &[&arguments[..], &more].concat());
     // Take-off and the way to the start.
     std::thread::sleep(Duration::from_secs(20));
     let socket = UdpSocket::bind("127.0.0.1:0").expect("a socket");
@@ -198,11 +200,12 @@ pub fn load(seconds: f64) -> f64 {
     let folder = Folder::new();
     prepare(&folder, "square8-detection", "[flight]\nmode = \"guided\"\n");
     let port = free_port();
+    let program = built("quietpath-bridge");
     let flying = vehicle(&folder, port, 22.0 + seconds);
     let (link, config) = (format!("udpin:127.0.0.1:{port}"), folder.path("bridge.toml"));
     let (scenario, plan) = (folder.path("scenario.toml"), folder.path("plan.json"));
     let arguments = ["run", "--config", &config, "--link", &link, "--scenario", &scenario, "--plan", &plan];
-    let mut bridge = start(&built("quietpath-bridge"), &arguments);
+    let mut bridge = start(&program, &arguments);
     std::thread::sleep(Duration::from_secs(20));
     let (before, begin) = (processor(&bridge), Instant::now());
     std::thread::sleep(Duration::from_secs_f64(seconds));
