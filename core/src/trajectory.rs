@@ -14,7 +14,7 @@
 //! Limits: `NODES` holds N + 1 nodes, `AGENTS` agents.
 
 use crate::error::{Error, Fault, Item};
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, origin};
 use crate::scenario::View;
 
 /// One agent's path and controls; entries past the last node are zero.
@@ -33,9 +33,9 @@ pub struct Track<T, const DIM: usize, const NODES: usize> {
 impl<T: Real, const DIM: usize, const NODES: usize> Track<T, DIM, NODES> {
     /// All zeros.
     #[must_use]
-    pub fn zeros() -> Self {
-        let zero = [T::zero(); NODES];
-        Self { path: [Point::zeros(); NODES], jam: zero, azimuth: zero, dropout: zero }
+    pub const fn zeros() -> Self {
+        let zero = [T::ZERO; NODES];
+        Self { path: [origin(); NODES], jam: zero, azimuth: zero, dropout: zero }
     }
 }
 
@@ -53,8 +53,8 @@ pub struct Trajectory<T, const DIM: usize, const NODES: usize, const AGENTS: usi
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Trajectory<T, DIM, NODES, AGENTS> {
     /// All zeros, on no interval.
     #[must_use]
-    pub fn empty() -> Self {
-        Self { intervals: 0, agents: 0, times: [T::zero(); NODES], tracks: [Track::zeros(); AGENTS] }
+    pub const fn empty() -> Self {
+        Self { intervals: 0, agents: 0, times: [T::ZERO; NODES], tracks: [Track::zeros(); AGENTS] }
     }
 
     /// All zeros, of the given size.

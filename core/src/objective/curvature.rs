@@ -203,7 +203,8 @@ where
         let part = Part { scenario, situation: &situation, emitters: &emitters, focus: &focus, needs };
         let slopes = |values: &Values<T>| weigh.slopes(other, values);
         // The common case with the layout known when it is compiled.
-        if focus.direct == Variables::POSITION && emitters.is_empty() {
+        let is_common = focus.direct == Variables::POSITION && emitters.is_empty();
+        if is_common && !cfg!(feature = "compact") {
             let focus = Focus { direct: Variables::POSITION, emitter: 0, emission: Variables::POSITION };
             Part { focus: &focus, emitters: &[], ..part }.add(&mut sum, slopes, scratch);
         } else {

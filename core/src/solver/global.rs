@@ -166,13 +166,17 @@ type Candidates<T> = Vec<(T, usize, Variant<T>), CANDIDATES>;
 
 /// Keeps a candidate if it is among the best.
 fn enter<T: Real>(candidates: &mut Candidates<T>, candidate: (T, usize, Variant<T>)) {
-    let place = candidates.iter().take_while(|other| other.0 <= candidate.0).count();
-    if place < CANDIDATES {
-        if candidates.is_full() {
-            candidates.pop();
+    if candidates.is_full() && candidates.last().is_some_and(|last| candidate.0 < last.0) {
+        candidates.pop();
+    }
+    let _ = candidates.push(candidate);
+    // It sinks to where the better ones end: no place is ever out of bounds.
+    let mut before: Option<&mut (T, usize, Variant<T>)> = None;
+    for here in candidates.iter_mut().rev() {
+        if let Some(last) = before.filter(|last| last.0 < here.0) {
+            core::mem::swap(last, here);
         }
-        // There is room now.
-        let _ = candidates.insert(place, candidate);
+        before = Some(here);
     }
 }
 

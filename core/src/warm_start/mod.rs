@@ -203,8 +203,8 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, C
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENTS> {
     /// Empty memory.
     #[must_use]
-    pub fn new() -> Self {
-        let zero = [T::zero(); CELLS];
+    pub const fn new() -> Self {
+        let zero = [T::ZERO; CELLS];
         Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none() }
     }
 

@@ -66,11 +66,8 @@ pub(super) struct Refinement<T, const DIM: usize, const NODES: usize, const AGEN
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Refinement<T, DIM, NODES, AGENTS> {
-    pub(super) fn empty() -> Self {
-        Self {
-            systems: core::array::from_fn(|_| System::empty()),
-            multipliers: core::array::from_fn(|_| Multipliers::zeros()),
-        }
+    pub(super) const fn empty() -> Self {
+        Self { systems: [const { System::empty() }; AGENTS], multipliers: [const { Multipliers::zeros() }; AGENTS] }
     }
 }
 
@@ -389,12 +386,13 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             used[BUDGETS] = jam;
             used[BUDGETS + 1] = dropout;
             for worst in self.extremes.of(index) {
-                used[EXTREMES + worst.slot] = true;
+                used.iter_mut().skip(EXTREMES + worst.slot).take(1).for_each(|used| *used = true);
             }
             system.clear(self.frame.intervals, controls, used);
             source.fill(index, agent, multipliers, system, scratch);
             for worst in self.extremes.of(index) {
-                system.border_right[EXTREMES + worst.slot] -= worst.weight;
+                let slot = system.border_right.get_mut(EXTREMES + worst.slot);
+                slot.into_iter().for_each(|right| *right -= worst.weight);
             }
         }
         if self.is_guarded {
