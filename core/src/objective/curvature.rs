@@ -208,7 +208,7 @@ where
             let focus = Focus { direct: Variables::POSITION, emitter: 0, emission: Variables::POSITION };
             Part { focus: &focus, emitters: &[], ..part }.add(&mut sum, slopes, scratch);
         } else {
-            part.add_any(&mut sum, slopes, scratch);
+            part.add_any(&mut sum, &slopes, scratch);
         }
     }
     sum.mirrored()
@@ -224,11 +224,12 @@ struct Part<'a, T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
+    /// Compiled once, whatever the slopes.
     #[inline(never)]
     fn add_any<const M: usize>(
         &self,
         sum: &mut Jet<T, M>,
-        slopes: impl Fn(&Values<T>) -> Slopes<T>,
+        slopes: &dyn Fn(&Values<T>) -> Slopes<T>,
         scratch: &mut [Sample<T, DIM>],
     ) {
         self.add(sum, slopes, scratch);

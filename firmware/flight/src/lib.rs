@@ -40,7 +40,11 @@ pub type Planned = Step<f32, 2>;
 /// None: the problem is sound.
 #[inline(never)]
 pub fn begin() -> Result<Flight, Error> {
-    Flight::new(&problem(0.0)?.view())
+    // Borrowed, not moved: a problem is too large for a second copy on the stack.
+    match &problem(0.0) {
+        Ok(seen) => Flight::new(&seen.view()),
+        Err(error) => Err(*error),
+    }
 }
 
 /// Plans what is left of the flight among the sensors as they are now: the first time everywhere, later near the plan
@@ -50,8 +54,10 @@ pub fn begin() -> Result<Flight, Error> {
 /// None: the problem is sound.
 #[inline(never)]
 pub fn replan(flight: &mut Flight, memory: &mut Memory) -> Result<Planned, Error> {
-    let seen = problem(flight.tail().start_time())?;
-    flight.replan(&seen.view(), &settings(), Search::Tail, memory, &mut || false)
+    match &problem(flight.tail().start_time()) {
+        Ok(seen) => flight.replan(&seen.view(), &settings(), Search::Tail, memory, &mut || false),
+        Err(error) => Err(*error),
+    }
 }
 
 /// Flies on to the next plan; false at the end of the flight.

@@ -184,8 +184,8 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
 }
 
 /// A step of everything that is not in the iterate.
-struct Move<T> {
-    unknowns: Vec<[T; COLUMNS], 32>,
+struct Move<T, const AGENTS: usize> {
+    unknowns: Vec<[T; COLUMNS], AGENTS>,
     /// Predicted change of the merit.
     slope: T,
 }
@@ -280,7 +280,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     fn visit_multipliers<const NODES: usize, const SENSORS: usize>(
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        unknowns: Option<&Vec<[T; COLUMNS], 32>>,
+        unknowns: Option<&Vec<[T; COLUMNS], AGENTS>>,
         update: impl Fn(T, T) -> T,
     ) {
         let Workspace { iterate, candidate, trial, scratch, refinement, .. } = workspace;
@@ -346,7 +346,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
-    ) -> Option<Move<T>> {
+    ) -> Option<Move<T, AGENTS>> {
         self.assemble(workspace);
         let (global_weight, global_right) = self.pace_equation(workspace);
         let smallest = T::real(1e-6) * (T::one() + self.barrier);
@@ -433,12 +433,12 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         shift: T,
         (global_weight, global_right): (T, T),
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> Option<Move<T>> {
+    ) -> Option<Move<T, AGENTS>> {
         let Workspace { iterate, candidate, refinement, .. } = workspace;
         let agents = self.frame.agents;
         let mut weight = global_weight + shift * self.frame.inertia;
         let mut right = global_right;
-        let mut reduced = Vec::<_, 32>::new();
+        let mut reduced = Vec::<_, AGENTS>::new();
         for system in refinement.systems.iter_mut().take(agents) {
             if !system.factor(shift) {
                 return None;
@@ -484,7 +484,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     /// Goes along the step as far as bounds and merit allow; returns the share, or `None` if nothing was gained.
     fn advance<const NODES: usize, const SENSORS: usize>(
         &mut self,
-        step: &Move<T>,
+        step: &Move<T, AGENTS>,
         merit: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
