@@ -4,6 +4,8 @@
 //! instruction, so that the 25 MHz timer counts instructions, 40 at a time.
 #![no_std]
 
+pub mod uart;
+
 use core::ptr::{read_volatile, write_volatile};
 
 use cortex_m_semihosting::debug;

@@ -31,6 +31,8 @@ fn nothing_points_back() {
             assert!(arrows.contains(below), "{name} does not depend on {below}, on which it should stand");
         }
     }
+    let from_c = arrows(package(&metadata, "quietpath-capi"));
+    assert_eq!(from_c, BTreeSet::from(["quietpath-core"]), "the C interface stands on the core alone");
     let outside = arrows(package(&metadata, "xtask"));
     assert!(
         outside.iter().all(|name| !name.starts_with("quietpath")),
@@ -42,7 +44,8 @@ fn nothing_points_back() {
 fn every_package_is_placed() {
     let metadata = metadata();
     let names: BTreeSet<_> = metadata.workspace_packages().iter().map(|package| package.name.to_string()).collect();
-    let placed = ["quietpath-bridge", "quietpath-core", "quietpath-sim", "quietpath-tests", "xtask"];
+    let placed =
+        ["quietpath-bridge", "quietpath-capi", "quietpath-core", "quietpath-sim", "quietpath-tests", "xtask"];
     assert_eq!(names, placed.map(String::from).into(), "a new package needs its place in `nothing_points_back`");
 }
 

@@ -1,10 +1,12 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `count`.
+//! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`,
+//! `sizes`, `ci`, `pictures`, `gallery`, `bench`, `count`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
 
 mod count;
 mod step;
+mod target;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -13,9 +15,7 @@ use anyhow::Context;
 use clap::{Parser, Subcommand};
 
 use step::Step;
-
-/// What the planning core is compiled for: Cortex-M4F and Cortex-M7F without an operating system.
-const TARGET: &str = "thumbv7em-none-eabihf";
+use target::Table;
 
 /// Scenarios whose landscape, with the path through it, is shown on the pages.
 const PICTURES: [&str; 2] = ["square8-detection", "square8-aee"];
@@ -31,10 +31,23 @@ struct Arguments {
 enum Command {
     /// Formatting, lints and documentation, with warnings as errors
     Check,
-    /// All tests, those with programs from PyPI too, and the core for the microcontroller; installs the target if it is missing
+    /// All tests, those with programs from PyPI too, and the firmware; installs what the firmware needs
     Test,
-    /// The core alone for the microcontroller, in f32 and f64
+    /// The firmware: built, run under QEMU, compared with the host bit for bit
     Target,
+    /// The header of the C interface, made anew from its source
+    Header,
+    /// Instructions of pieces of planning on a microcontroller, by size; writes firmware/instructions.md
+    Instructions,
+    /// What the firmware takes of flash, RAM and stack; fails past the budget
+    Sizes {
+        /// Print what changed against the committed table
+        #[arg(long)]
+        compare: bool,
+        /// Write the committed table anew
+        #[arg(long, conflicts_with = "compare")]
+        write: bool,
+    },
     /// What continuous integration runs: check, then test
     Ci,
     /// The pictures of the README, drawn anew by the program
@@ -76,7 +89,17 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Check => check(),
         Command::Test => test(),
-        Command::Target => target(),
+        Command::Target => return target::target(top),
+        Command::Header => return target::header(top),
+        Command::Instructions => return target::instructions(top),
+        Command::Sizes { compare, write } => {
+            let table = match (*compare, *write) {
+                (true, _) => Table::Compare,
+                (_, true) => Table::Write,
+                _ => Table::Ignore,
+            };
+            return target::sizes(table, top);
+        }
         Command::Ci => check().into_iter().chain(test()).collect(),
         Command::Pictures => pictures(),
         Command::Gallery => vec![Step::cargo("gallery", "run --package quietpath-sim --example gallery")],
@@ -91,7 +114,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
 fn check() -> Vec<Step> {
     vec![
         Step::cargo("formatting", "fmt --all --check"),
-        Step::cargo("formatting, embedded", "fmt --manifest-path tests/embedded/Cargo.toml --check"),
+        Step::cargo("formatting of the firmware", "fmt --manifest-path firmware/Cargo.toml --all --check"),
         Step::cargo("lints", "clippy --workspace --all-targets -- -D warnings"),
         Step::cargo(
             "lints of the core with defmt",
@@ -104,19 +127,11 @@ fn check() -> Vec<Step> {
 
 fn test() -> Vec<Step> {
     let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
-    let mut steps =
-        vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
-    steps.extend(target());
-    steps
-}
-
-fn target() -> Vec<Step> {
-    // One folder of artifacts for both: the embedded consumer is a workspace of its own.
-    let embedded = format!("build --manifest-path tests/embedded/Cargo.toml --target-dir target --target {TARGET}");
     vec![
-        Step::new("target installed", "rustup", &format!("target add {TARGET}")),
-        Step::cargo("core alone", &format!("build --package quietpath-core --target {TARGET}")),
-        Step::cargo("core instantiated in f32 and f64", &format!("{embedded} --release")),
+        Step::cargo("tests", "test --workspace"),
+        Step::cargo("other people's MAVLink", interoperate),
+        Step::cargo("the firmware under QEMU", "xtask target"),
+        Step::cargo("sizes of the firmware", "xtask sizes --compare"),
     ]
 }
 

@@ -8,6 +8,8 @@
 
 mod problem;
 pub mod surface;
+#[cfg(feature = "yardstick")]
+pub mod yardstick;
 
 use quietpath_core::horizon::{Horizon, Search, Step};
 use quietpath_core::scenario::Scenario;
@@ -70,7 +72,42 @@ pub fn fly(flight: &mut Flight) -> bool {
 /// How precisely it plans.
 #[must_use]
 pub fn settings() -> Settings<f32> {
-    Settings::default()
+    Settings::frugal()
+}
+
+/// Where a vehicle should be, and how fast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setpoint {
+    /// East and north, length units.
+    pub position: [f32; 2],
+    /// Length units per s.
+    pub velocity: [f32; 2],
+}
+
+/// Whether what is flown of the plan in force before the next one lies behind at `time` (s).
+#[must_use]
+pub fn is_over(flight: &Flight, time: f32) -> bool {
+    let tail = flight.tail();
+    let last = INTERVALS_FLOWN.min(tail.intervals());
+    tail.times.get(last).is_some_and(|&end| end <= time) && tail.intervals() > 0
+}
+
+/// Where the plan in force has the agent at `time` (s): on a segment, or at rest at an end.
+#[must_use]
+pub fn setpoint(flight: &Flight, time: f32) -> Setpoint {
+    let tail = flight.tail();
+    let path = tail.active().first().map(|track| track.path.as_slice()).unwrap_or_default();
+    let nodes = || path.iter().zip(&tail.times).take(tail.nodes());
+    let mut at = nodes().next().map(|(place, _)| Setpoint { position: (*place).into(), velocity: [0.0; 2] });
+    for ((from, &begin), (to, &end)) in nodes().zip(nodes().skip(1)) {
+        let velocity = (to - from) / (end - begin);
+        if time >= end {
+            at = Some(Setpoint { position: (*to).into(), velocity: [0.0; 2] });
+        } else if time >= begin {
+            at = Some(Setpoint { position: (from + velocity * (time - begin)).into(), velocity: velocity.into() });
+        }
+    }
+    at.unwrap_or(Setpoint { position: [0.0; 2], velocity: [0.0; 2] })
 }
 
 /// Nodes of the plan in force, as bits: east, then north.

@@ -52,9 +52,9 @@ const TO_BOUNDARY: f64 = 0.99;
 /// Part of the predicted decrease that a step must bring.
 const SUFFICIENT: f64 = 1e-4;
 /// Factors tried for the shift of one system.
-const SHIFTS_MAX: usize = 24;
+pub(super) const SHIFTS_MAX: usize = 24;
 /// Halvings of one step.
-const HALVINGS_MAX: usize = 25;
+pub(super) const HALVINGS_MAX: usize = 25;
 /// Multipliers stay within this factor of mu / g.
 const MULTIPLIER_RANGE: f64 = 1e8;
 
