@@ -3,6 +3,7 @@
 //! The planning core has no heap: every list has a capacity that is part of its type. Firmware chooses its own;
 //! everything on the host uses these. A scenario that exceeds one is refused by name and number.
 
+use quietpath_core::horizon::Horizon;
 use quietpath_core::{Scenario, Trajectory};
 
 /// Nodes of the time grid.
@@ -20,3 +21,5 @@ pub const KNOTS: usize = 4096;
 pub type HostScenario<T, const DIM: usize> = Scenario<T, DIM, SENSORS, AGENTS, KNOTS>;
 /// A trajectory of the core, host size.
 pub type HostTrajectory<T, const DIM: usize> = Trajectory<T, DIM, NODES, AGENTS>;
+/// A flight in steps of the core, host size.
+pub type HostHorizon<T, const DIM: usize> = Horizon<T, DIM, NODES, AGENTS>;

@@ -4,7 +4,8 @@
 //! their own and a recorded flight replays bit for bit. [`Time`] counts microseconds from an arbitrary zero, never
 //! backwards; it says nothing about the date.
 //!
-//! Only the threads around the decisions own a [`SystemClock`].
+//! Only the threads around the decisions own a [`SystemClock`]. Against a simulated autopilot that has the same speed it may
+//! run faster than time does ([`SystemClock::at_speed`]); everything that is told in seconds then is told in its seconds.
 
 use std::ops::Add;
 use std::time::{Duration, Instant};
@@ -61,18 +62,50 @@ impl Add<Duration> for Time {
 
 /// The operating system's monotonic clock, counted from its making.
 #[derive(Clone, Copy, Debug)]
-pub struct SystemClock(Instant);
+pub struct SystemClock {
+    begin: Instant,
+    speed: f64,
+}
 
 impl SystemClock {
     /// A clock that reads zero now.
     #[must_use]
     pub fn start() -> Self {
-        Self(Instant::now())
+        Self { begin: Instant::now(), speed: 1.0 }
+    }
+
+    /// A clock that reads zero now and runs `speed` times as fast as time: for simulations alone. `None` where that is no
+    /// positive number.
+    #[must_use]
+    pub fn at_speed(speed: f64) -> Option<Self> {
+        (speed.is_finite() && speed > 0.0).then(|| Self { begin: Instant::now(), speed })
     }
 
     /// The time.
     #[must_use]
     pub fn now(&self) -> Time {
-        Time::ZERO + self.0.elapsed()
+        let elapsed = self.begin.elapsed();
+        // Multiplied only where it must be: a span of real time is not rounded.
+        Time::ZERO + if self.speed == 1.0 { elapsed } else { elapsed.mul_f64(self.speed) }
+    }
+
+    /// How long a span of this clock takes, for those who wait on the operating system.
+    #[must_use]
+    pub fn real(&self, span: Duration) -> Duration {
+        if self.speed == 1.0 { span } else { span.div_f64(self.speed) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fast_clock_waits_shorter() {
+        let clock = SystemClock::at_speed(50.0).expect("a clock");
+        assert_eq!(clock.real(Duration::from_secs(5)), Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(20));
+        assert!(clock.now() >= Time::from_millis(1000), "{:?}", clock.now());
+        assert!([0.0, -1.0, f64::NAN, f64::INFINITY].into_iter().all(|speed| SystemClock::at_speed(speed).is_none()));
     }
 }

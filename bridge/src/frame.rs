@@ -69,13 +69,13 @@ impl LocalFrame {
     /// The frame of a scenario; `None` where its file gives no latitude and longitude.
     #[must_use]
     pub fn of(scenario: &ScenarioFile) -> Option<Self> {
-        let origin = scenario.frame.origin?;
-        Some(Self {
-            geodesic: Geodesic::wgs84(),
-            origin,
-            unit_m: scenario.frame.unit_m,
-            dimension: scenario.dimension,
-        })
+        Some(Self::around(scenario.frame.origin?, scenario.frame.unit_m, scenario.dimension))
+    }
+
+    /// The frame around an origin, of `unit_m` metres a length unit, in two or three dimensions.
+    #[must_use]
+    pub fn around(origin: Origin, unit_m: f64, dimension: usize) -> Self {
+        Self { geodesic: Geodesic::wgs84(), origin, unit_m, dimension }
     }
 
     /// Metres in a length unit.
@@ -144,8 +144,7 @@ mod tests {
     use super::*;
 
     fn frame(latitude_deg: f64, longitude_deg: f64, unit_m: f64, dimension: usize) -> LocalFrame {
-        let origin = Origin { latitude_deg, longitude_deg, altitude_m: 30.0 };
-        LocalFrame { geodesic: Geodesic::wgs84(), origin, unit_m, dimension }
+        LocalFrame::around(Origin { latitude_deg, longitude_deg, altitude_m: 30.0 }, unit_m, dimension)
     }
 
     #[test]

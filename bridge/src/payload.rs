@@ -23,6 +23,10 @@ use crate::link::{Frame, Identity};
 
 /// How often payloads hear from the bridge.
 pub const REFRESH: Duration = Duration::from_millis(250);
+/// How soon a change is said again, as the first time may be lost.
+const AGAIN: Duration = Duration::from_millis(30);
+/// How often a change is said again that soon.
+const AGAIN_TIMES: u8 = 2;
 /// How long a payload goes on without hearing from the bridge, s.
 pub const TIME_TO_LIVE_S: f32 = 1.0;
 
@@ -74,6 +78,8 @@ pub struct Relay {
     radiation: Radiation,
     sent: Option<Time>,
     last: Option<Emission>,
+    /// How often the last change is still to be said soon.
+    again: u8,
     /// What each payload answered last.
     answers: Vec<Option<MavResult>>,
 }
@@ -83,7 +89,7 @@ impl Relay {
     #[must_use]
     pub fn new(payloads: Vec<Payload>, radiation: Radiation) -> Self {
         let answers = vec![None; payloads.len()];
-        Self { payloads, radiation, sent: None, last: None, answers }
+        Self { payloads, radiation, sent: None, last: None, again: 0, answers }
     }
 
     /// What is being emitted; `None` for nothing.
@@ -109,16 +115,18 @@ impl Relay {
 
     /// Sends what is due. Without an emission, or with one that is not finite: level 0 and full power.
     ///
-    /// A change to nothing, or from nothing, does not wait for the next repetition.
+    /// A change does not wait for the next repetition, and is said thrice in a row.
     pub fn poll(&mut self, now: Time, vehicle: Identity, emission: Option<Emission>, out: &mut Vec<MavMessage>) {
         let is_finite = |emission: &Emission| {
             [emission.level, emission.azimuth, emission.dropout].iter().all(|number| number.is_finite())
         };
         let emission = emission.filter(is_finite);
         let is_change = emission != self.last;
-        if !is_change && self.sent.is_some_and(|sent| now.since(sent) < REFRESH) {
+        let wait = if self.again > 0 { AGAIN } else { REFRESH };
+        if !is_change && self.sent.is_some_and(|sent| now.since(sent) < wait) {
             return;
         }
+        self.again = if is_change { AGAIN_TIMES } else { self.again.saturating_sub(1) };
         (self.sent, self.last) = (Some(now), emission);
         self.speak(vehicle, emission, out);
     }
@@ -183,7 +191,8 @@ mod tests {
             relay.poll(Time::from_millis(tick * 100), VEHICLE, Some(JAM), &mut out);
         }
         let (power, jam) = ((31010, [1.0, 0.75, 1.0, 0.0, 0.0]), (31011, [2.0, 0.5, 90.0, 0.0, 1.0]));
-        assert_eq!(levels(&out), [power, jam, power, jam, power, jam, power, jam]);
+        // At 0, 100 and 200 ms, and then every 250 ms, as far as it is asked.
+        assert_eq!(levels(&out), [power, jam].repeat(5));
         out.clear();
         relay.poll(Time::from_millis(901), VEHICLE, None, &mut out);
         let off = [(31010, [1.0, 1.0, 1.0, 0.0, 0.0]), (31011, [2.0, 0.0, 90.0, 0.0, 1.0])];

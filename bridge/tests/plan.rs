@@ -63,12 +63,6 @@ fn limits_on_work_end_with_a_feasible_plan_that_says_so() {
 }
 
 #[test]
-fn what_is_not_planned_is_refused_at_its_line() {
-    let error = plan(&scenario("wight"), &Options::default()).expect_err("steps").to_string();
-    assert!(error.contains("rolling asks for planning in steps") && error.contains("| [rolling]"), "{error}");
-}
-
-#[test]
 fn regions_and_limits_are_kept() {
     for name in ["wight", "square8-limit"] {
         let options = Options { rollout: Rollout::Once, ..Options::default() };

@@ -99,13 +99,13 @@ fn a_worker_answers_while_others_go_on_and_a_late_answer_does_not_fly() {
 
 #[test]
 fn budgets_of_the_rest_are_what_is_left() {
-    let text = SCENARIO.replace("accel_max = 0.5", "accel_max = 0.5\njammer = { budget = 10.0 }");
+    let text = SCENARIO.replace("accel_max = 0.5", "accel_max = 0.5\njammer = { budget = 30.0 }");
     let world = ScenarioFile::parse("s.toml", &text).expect("a scenario").scenario;
     let (_, mut flying) = begin();
     let interval = flying.duration / 20.0;
     flying.agents[0].jam = Some((0..=20).map(|node| if node <= 4 { 1.0 } else { 0.25 }).collect());
     let job = job(&world, &flying, 5.9 * interval);
     let left = job.scenario.agents[0].jammer.expect("a jammer").budget;
-    assert!((left - (10.0 - 4.5 * interval)).abs() < 1e-9, "{left}");
+    assert!((left - (30.0 - 4.5 * interval)).abs() < 1e-9, "{left}");
     assert_eq!(job.tail.agents[0].jam.as_deref().map(|jam| jam[1]), Some(0.25));
 }

@@ -2,7 +2,7 @@
 
 use quietpath_core::constraints::{TOLERANCE, budget, violations};
 use quietpath_core::error::{Fault, Item};
-use quietpath_core::horizon::{Cadence, Choice, Horizon, Reveal, Search, State, Step, reveal};
+use quietpath_core::horizon::{Cadence, Choice, Horizon, NEAR_ITERATIONS, Reveal, Search, State, Step, reveal};
 use quietpath_core::math::norm;
 use quietpath_core::metrics::Sample;
 use quietpath_core::objective::{Extreme, value};
@@ -383,4 +383,29 @@ fn a_new_plan_is_never_worse_than_the_tail_and_anew_never_worse_than_near_it() {
     let anew = replan(&mut other, &world.view(), Search::Anew);
     assert!(anew.outcome.objective <= near.outcome.objective);
     assert!(anew.outcome.evaluations > near.outcome.evaluations);
+}
+
+#[test]
+fn a_warm_step_iterates_little_where_it_can_refine_and_longer_where_it_cannot() {
+    let mission = hide(vec![at(3.0, 5.2), at(7.0, 4.5), crossing()]);
+    let world = mission.stored();
+    let warm = |refinements| {
+        let settings = Settings { refinements, ..Settings::default() };
+        let mut memory = Box::new(Memory::new());
+        let mut flight = Flight::new(&world.view()).expect("it fits");
+        let mut step = |seen: &View<'_, f64, 2>| {
+            flight.replan(seen, &settings, Search::Tail, &mut memory, &mut || false).expect("it can be planned");
+            flight.fly(6)
+        };
+        step(&world.view());
+        let sensors = reveal::<_, 2, 8>(&world.view(), Reveal::Current, 60.0, |_| true).expect("they fit");
+        let seen = world.view().with_sensors(&sensors);
+        flight.replan(&seen, &settings, Search::Tail, &mut memory, &mut || false).expect("it can be planned")
+    };
+    let (refined, unrefined) = (warm(120), warm(0));
+    assert!(refined.outcome.iterations <= NEAR_ITERATIONS && refined.outcome.refinements > 0, "{refined:?}");
+    assert!(unrefined.outcome.iterations > NEAR_ITERATIONS, "{unrefined:?}");
+    assert_eq!([refined, unrefined].map(|step| step.outcome.status), [Status::Converged; 2]);
+    let gap = unrefined.outcome.objective - refined.outcome.objective;
+    assert!(gap.abs() <= 1e-3 * refined.outcome.objective.abs(), "{refined:?} {unrefined:?}");
 }

@@ -1,10 +1,12 @@
 //! The command line: what can be asked, and how each command is explained.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::builder::styling::{AnsiColor, Styles};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::autopilot::Home;
 use crate::trade::{Amount, Over};
 
 const STYLES: Styles = Styles::styled()
@@ -35,6 +37,9 @@ pub struct Cli {
 pub enum Command {
     /// Plan a flight; print a summary, write the plan, pictures and mission files
     #[command(after_help = "\
+A scenario with `[rolling]` is planned in steps, each of which knows the world as it is by then; what is written, and
+weighed, is the path that was flown, and `steps/` in the folder holds the plan of each step.
+
 Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
 
 Example:
@@ -73,6 +78,17 @@ Example:
 Example:
   quietpath new scenario.toml")]
     New(NewArgs),
+    /// Be a simulated autopilot on a MAVLink link, for `quietpath-bridge` and ground stations to fly
+    #[command(after_help = "\
+Links: udpin:HOST:PORT and tcpin:HOST:PORT wait, udpout: and tcpout: call, pty:PATH makes a serial line, serial:DEVICE
+uses one. Times are seconds of the flight; with --speedup 10 one of them takes a tenth of a second, and whoever is at the
+other end must have the same speed. The same seed has the same faults.
+
+Exit status: 0 its time is over, 2 bad input.
+
+Example:
+  quietpath autopilot --connect udpout:127.0.0.1:14540 --like px4 --scenario scenario.toml")]
+    Autopilot(Box<AutopilotArgs>),
     /// Print the completions of a shell
     #[command(after_help = "\
 Example:
@@ -170,6 +186,124 @@ pub struct NewArgs {
     /// Overwrite a file that exists
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `quietpath autopilot`.
+#[derive(Debug, Args)]
+pub struct AutopilotArgs {
+    /// The link that it speaks on
+    #[arg(long, value_name = "URL")]
+    pub connect: String,
+    /// Which autopilot it is like
+    #[arg(long, value_enum)]
+    pub like: LikeArg,
+    /// Scenario whose agent it is: it stands below the agent's start, as fast as the agent
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<String>,
+    /// The agent [default: the first]
+    #[arg(long, value_name = "NAME", requires = "scenario")]
+    pub agent: Option<String>,
+    /// Where it stands: degrees and metres above the sea
+    #[arg(long, value_name = "LAT,LON,ALT", value_parser = home, allow_hyphen_values = true)]
+    pub at: Option<Home>,
+    /// What the person with the remote control does
+    #[arg(long, value_enum, default_value_t = PilotArg::None)]
+    pub pilot: PilotArg,
+    /// How many times faster than time it flies
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    pub speedup: f64,
+    /// System id
+    #[arg(long, value_name = "ID", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=250))]
+    pub system: u8,
+    /// Key file: sign what is sent, refuse what is not signed
+    #[arg(long, value_name = "FILE")]
+    pub signing_key: Option<PathBuf>,
+    /// A jammer on board at this component id; may be repeated
+    #[arg(long, value_name = "ID")]
+    pub jammer: Vec<u8>,
+    /// A transmitter on board at this component id; may be repeated
+    #[arg(long, value_name = "ID")]
+    pub transmitter: Vec<u8>,
+    /// End after this time
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub seconds: Option<Duration>,
+    /// Write the track that is flown as CSV
+    #[arg(long, value_name = "FILE")]
+    pub track: Option<PathBuf>,
+    /// Faults: share of frames that are lost, in each direction
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pub loss: f64,
+    /// Faults: share of frames that come twice
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pub duplicate: f64,
+    /// Faults: share of frames with a flipped bit
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
+    pub corrupt: f64,
+    /// Faults: least delay
+    #[arg(long, value_name = "MS", default_value_t = 0)]
+    pub delay: u64,
+    /// Faults: largest delay on top of it, which reorders frames
+    #[arg(long, value_name = "MS", default_value_t = 0)]
+    pub jitter: u64,
+    /// Faults: seed of their chance
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Faults: the autopilot restarts at this time; may be repeated
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub restart_at: Vec<Duration>,
+    /// Faults: nothing comes in or goes out for a while; may be repeated
+    #[arg(long, value_name = "FROM-UNTIL", value_parser = window)]
+    pub silent: Vec<Window>,
+    /// Faults: another ground station replaces the mission at this time; may be repeated
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub station_at: Vec<Duration>,
+}
+
+/// From when, until when.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Window(pub Duration, pub Duration);
+
+/// A kind of autopilot, as the command line names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LikeArg {
+    /// PX4
+    Px4,
+    /// ArduPilot: ArduCopter
+    Ardupilot,
+}
+
+/// What the person with the remote control does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PilotArg {
+    /// Nothing: the vehicle stands
+    None,
+    /// Arms, takes off, and leaves the vehicle in the air
+    Takeoff,
+    /// Waits for a mission, arms and starts it
+    Mission,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let number = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
+    Duration::try_from_secs_f64(number).map_err(|_| "not a time in seconds".to_owned())
+}
+
+fn window(text: &str) -> Result<Window, String> {
+    let (from, until) = text.split_once('-').ok_or("write it as 30-34.5")?;
+    let window = Window(seconds(from)?, seconds(until)?);
+    if window.0 < window.1 { Ok(window) } else { Err("it ends before it begins".to_owned()) }
+}
+
+fn home(text: &str) -> Result<Home, String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_slice() {
+        [latitude_deg, longitude_deg, altitude_m]
+            if latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 180.0 && altitude_m.is_finite() =>
+        {
+            Ok(Home { latitude_deg: *latitude_deg, longitude_deg: *longitude_deg, altitude_m: *altitude_m })
+        }
+        _ => Err("write latitude and longitude in degrees and the altitude in metres, as 47.4,8.5,488".to_owned()),
+    }
 }
 
 /// Arguments of `quietpath completions`.

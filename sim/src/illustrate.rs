@@ -1,12 +1,14 @@
 //! From scenarios and plans to pictures: what is shown, in which unit, under which title.
 
+pub mod steps;
+
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::scenario::{MotionEntry, SensorEntry};
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
-use quietpath_bridge::planning::{self, Assessment};
-use quietpath_core::scenario::{Limit, Metric};
+use quietpath_bridge::planning::{self, Assessment, Step};
+use quietpath_core::scenario::{BeamPattern, Limit, Metric};
 
-use crate::picture::landscape::{Flight, Region, Scene, Sensor};
+use crate::picture::landscape::{Ends, Flight, Region, Scene, Sensor};
 use crate::picture::scale::{Kind, trimmed};
 use crate::picture::series::{Bound, Line, Panel, Sheet, time_unit};
 use crate::picture::{DrawError, Grid, Picture, colour, landscape, series};
@@ -25,6 +27,8 @@ pub struct Flown<'a> {
     pub plan: &'a PlanFile,
     /// Its figures.
     pub assessment: &'a Assessment,
+    /// The steps that it was flown in; none where it was planned in one piece.
+    pub steps: &'a [Step],
 }
 
 /// Draws a metric over the area at an instant, with the flights of a plan where there is one.
@@ -39,9 +43,8 @@ pub fn landscape(
     let presentation = Presentation::of(field.metric, scenario.dimension, scenario.frame.unit_m);
     let title = format!("{}: {}", scenario.name, presentation.name);
     let heading = [title, landscape_subtitle(scenario, field, plan)];
-    let scale = map_unit(scenario).1;
     let agents = plan.iter().flat_map(|plan| &plan.agents).enumerate();
-    let flights = agents.map(|(index, agent)| flight(agent, scale, &agent.name, colour::agent(index))).collect();
+    let flights = agents.map(|(index, agent)| flight(scenario, agent, &agent.name, colour::agent(index))).collect();
     overlay(scenario, field, heading, flights)
 }
 
@@ -117,7 +120,7 @@ fn landscape_subtitle(scenario: &ScenarioFile, field: &planning::Grid, plan: Opt
 fn flight_words(scenario: &ScenarioFile, plan: &PlanFile) -> String {
     let metres: f64 = plan.agents.iter().map(|agent| path_length(&agent.path)).sum::<f64>() * scenario.frame.unit_m;
     let objective = plan.objective.map(|value| format!(", objective {}", trimmed(value))).unwrap_or_default();
-    let status = plan.status.as_ref().map(|status| format!(" ({status})")).unwrap_or_default();
+    let status = plan.status.as_ref().map(|status| format!(" ({})", status.replace('_', " "))).unwrap_or_default();
     let who = if plan.agents.len() > 1 { format!("{} flights", plan.agents.len()) } else { "flight".into() };
     format!("{who} of {} over {}{objective}{status}", units::duration(plan.duration), units::length(metres))
 }
@@ -157,16 +160,21 @@ fn sensor_mark(sensor: &SensorEntry, time: f64, scale: f64) -> Sensor {
     }
 }
 
-/// One agent's part of a plan, `scale` map units a length unit.
+/// One agent's part of a plan, in the unit of [`map_unit`].
 #[must_use]
-pub fn flight(agent: &AgentPlan, scale: f64, name: &str, colour: &str) -> Flight {
+pub fn flight(scenario: &ScenarioFile, agent: &AgentPlan, name: &str, colour: &str) -> Flight {
+    let scale = map_unit(scenario).1;
+    let entry = scenario.agents.iter().find(|entry| entry.name == agent.name);
+    let is_directed = entry.and_then(|it| it.jammer).is_some_and(|it| it.pattern != BeamPattern::Isotropic);
     Flight {
         name: name.to_owned(),
         colour: colour.to_owned(),
         dash: "",
         width: landscape::LINE,
+        ends: Ends::Both,
         points: agent.path.iter().map(|position| flat(position, scale)).collect(),
         jam: agent.jam.clone().unwrap_or_default(),
+        azimuth: agent.azimuth.clone().filter(|_| is_directed).unwrap_or_default(),
         dropout: agent.dropout.clone().unwrap_or_default(),
     }
 }
@@ -174,7 +182,7 @@ pub fn flight(agent: &AgentPlan, scale: f64, name: &str, colour: &str) -> Flight
 /// Draws every figure along the flight.
 #[must_use]
 pub fn series(scenario: &ScenarioFile, flown: Flown<'_>) -> Picture {
-    let Flown { plan, assessment } = flown;
+    let Flown { plan, assessment, steps } = flown;
     let times = plan.node_times();
     let (time_unit, second) = time_unit(plan.duration);
     let times: Vec<f64> = times.into_iter().map(|time| time / second).collect();
@@ -193,6 +201,7 @@ pub fn series(scenario: &ScenarioFile, flown: Flown<'_>) -> Picture {
         time_unit,
         time: [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(1.0)],
         agents: scenario.agents.iter().map(|agent| agent.name.clone()).collect(),
+        steps: steps.iter().skip(1).map(|step| step.time() / second).collect(),
         panels,
     })
 }

@@ -2,20 +2,24 @@
 //!
 //! | module | what |
 //! |---|---|
+//! | [`autopilot`] | a simulated autopilot |
 //! | [`cli`] | the command line: arguments and their explanations |
 //! | [`commands`] | what each command does |
 //! | [`outcome`] | exit statuses, error messages, standard streams, progress |
+//! | [`rehearsal`] | a whole flight in one process: bridge, autopilot, wires, one clock |
 //! | [`report`] | the summaries and tables that commands print |
 //! | [`illustrate`] | from plans to pictures |
 //! | [`picture`] | drawing: landscapes and series as SVG and PNG |
 //! | [`trade`] | plans over a range of deadlines or budgets |
 //! | [`units`] | from the scenario's units to the ones that people read |
 
+pub mod autopilot;
 pub mod cli;
 pub mod commands;
 pub mod illustrate;
 pub mod outcome;
 pub mod picture;
+pub mod rehearsal;
 pub mod report;
 pub mod trade;
 pub mod units;

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use anstyle::{AnsiColor, Style};
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
-use quietpath_bridge::planning::{AgentSeries, Assessment, Obstacle};
+use quietpath_bridge::planning::{AgentSeries, Assessment, Choice, Obstacle, Step};
 use quietpath_core::constraints::TOLERANCE;
 use quietpath_core::scenario::{Metric, Sense};
 
@@ -47,6 +47,45 @@ pub fn summary(scenario: &ScenarioFile, plan: &PlanFile, assessment: &Assessment
         row("planning time", &span(timing.plan_seconds));
     }
     text
+}
+
+/// What each step did, a step a line; nothing where there are none.
+#[must_use]
+pub fn steps(steps: &[Step]) -> String {
+    let mut text = String::new();
+    if steps.is_empty() {
+        return text;
+    }
+    let _ = writeln!(
+        text,
+        "\n{:>4} {:>12} {:>9}  {:<4}  {:<15} {:>16}  {:<8} {:>10} {:>8}",
+        "step", "begins", "intervals", "plan", "status", "objective ahead", "feasible", "planning", "change"
+    );
+    for (index, step) in steps.iter().enumerate() {
+        let feasible = if step.feasible { "yes".to_owned() } else { format!("{BAD}{:<8}{BAD:#}", "no") };
+        let _ = writeln!(
+            text,
+            "{:>4} {:>12} {:>9}  {:<4}  {:<15} {:>16}  {feasible:<8} {:>10} {:>8.4}",
+            index + 1,
+            format!("{:.1} s", step.time()),
+            step.intervals,
+            choice(step.choice),
+            step.status.name().replace('_', " "),
+            step.plan.objective.map(|value| trimmed_to(value, 9)).unwrap_or_default(),
+            span(step.plan_seconds()),
+            step.change,
+        );
+    }
+    text
+}
+
+/// Which plan a step flies: one of its own, or the rest of the one before.
+#[must_use]
+pub const fn choice(choice: Choice) -> &'static str {
+    match choice {
+        Choice::New => "new",
+        Choice::Tail => "kept",
+    }
 }
 
 /// Why there is no feasible plan, and what may help.

@@ -3,6 +3,8 @@
 pub mod bench;
 pub mod figures;
 pub mod instances;
+pub mod live;
+pub mod programs;
 pub mod starts;
 
 use std::path::{Path, PathBuf};

@@ -97,3 +97,15 @@ fn quoted_outside_fences(text: &str) -> Vec<String> {
     let prose = text.split("```").step_by(2);
     prose.flat_map(|part| part.lines().flat_map(quoted).map(String::from).collect::<Vec<_>>()).collect()
 }
+
+#[test]
+fn the_gallery_shows_its_pictures_and_there_are_no_others() {
+    let text = page("docs/gallery.md");
+    let shown: std::collections::BTreeSet<&str> =
+        text.split("](gallery/").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    let folder = fs::read_dir(repository().join("docs/gallery")).expect("the pictures");
+    let there: std::collections::BTreeSet<String> =
+        folder.flatten().map(|file| file.file_name().to_string_lossy().into_owned()).collect();
+    assert!(shown.iter().copied().eq(there.iter().map(String::as_str)), "{shown:?} are shown, {there:?} are there");
+    assert!(!text.contains("not planned"), "a scenario of the gallery is not planned");
+}

@@ -5,7 +5,7 @@
 //! until they do not matter. Detection does not change with the unit once the sensors' scales are converted.
 
 use quietpath_bridge::file::ScenarioFile;
-use quietpath_bridge::file::scenario::MotionEntry;
+use quietpath_bridge::file::scenario::{MotionEntry, Outline};
 use quietpath_bridge::planning::{Options, Planned, plan};
 use quietpath_core::scenario::{Detection, Ranging};
 use quietpath_tests::scenario;
@@ -42,9 +42,19 @@ impl Motion {
             agent.speed_max *= length;
             agent.accel_max *= length;
         }
+        for region in &mut moved.regions {
+            let place = |at: &[f64; 2]| -> [f64; 2] { self.moved(at).try_into().expect("two coordinates") };
+            match &mut region.outline {
+                Outline::Circle { center, radius } => (*center, *radius) = (place(center), *radius * length),
+                Outline::Polygon(corners) => corners.iter_mut().for_each(|corner| *corner = place(corner)),
+            }
+        }
         for sensor in &mut moved.sensors {
-            if let MotionEntry::Fixed(position) = &mut sensor.motion {
-                *position = self.moved(position);
+            match &mut sensor.motion {
+                MotionEntry::Fixed(position) => *position = self.moved(position),
+                MotionEntry::Track(track) => {
+                    track.iter_mut().for_each(|knot| knot.position = self.moved(&knot.position))
+                }
             }
             // Variances are squares of lengths; detection is a number without a unit.
             sensor.ranging = sensor.ranging.map(|ranging| match ranging {
@@ -139,6 +149,13 @@ fn plans_move_with_the_scenario() {
 fn plans_for_location_errors_move_with_the_scenario() {
     let names = ["square8-aee", "square8-jam", "square8-jam-risk", "square8-team"];
     let wrong = disagreements(&names, &MOTIONS[..2], SAME);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The flown path of all steps, past regions and a sensor that moves.
+#[test]
+fn flights_in_steps_move_with_the_scenario() {
+    let wrong = disagreements(&["wight", "wight-jam"], &MOTIONS[..2], SAME);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -1,9 +1,11 @@
 //! The flight itself: along the plan, to the next plan, and out of it.
 
+use crate::clock::Time;
 use crate::command::Command;
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
-use crate::replan::job::{Rejected, judge, rest};
+use crate::replan::job::{Rejected, budgets_at, joined, judge, rest, rest_at};
+use crate::setpoint::Curve;
 use crate::setpoint::Steering;
 use crate::telemetry::{Autopilot, Flying as InAir, Mode, Vehicle};
 
@@ -12,6 +14,10 @@ use super::{End, Flight, Flying, Level, Output, Phase};
 
 /// Time after the last node in which a steered vehicle settles, s.
 const SETTLE: f64 = 2.0;
+/// Times that are closer are the same, s.
+const NODE_TOLERANCE: f64 = 1e-6;
+/// How long a steered vehicle may take to the goal after its time, s.
+const ARRIVE_MAX: f64 = 30.0;
 /// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
 const BEHIND: usize = 2;
 
@@ -34,16 +40,24 @@ impl Flight {
             return self.give_up("the plan is older than its time to live".into());
         }
         let time = self.scenario_time();
-        if let Some(next) = self.next.take_if(|next| next.curve.begin() <= time) {
+        let is_steered = self.settings.mode == FlyMode::Guided;
+        if let Some(next) = self.next.take_if(|next| is_steered && next.curve.begin() <= time) {
             self.say(Level::Info, format!("the plan of {:.1} s flies", next.curve.begin()));
-            self.flying = next;
+            // Its first setpoint does not wait for its turn.
+            self.setpoint = None;
+            self.take_over(next);
         }
         match self.settings.mode {
             FlyMode::Guided => {
                 let sample = self.flying.curve.sample(time);
                 self.steer(vehicle, &sample, Steering::Along);
-                if time > self.flying.curve.end() + SETTLE {
+                let late = time - self.flying.curve.end();
+                let is_there = self.distance_m(vehicle, &sample.position) < self.settings.arrival_m;
+                if late > SETTLE && is_there {
                     return self.leave(Mode::Hold, End::Done);
+                }
+                if late > ARRIVE_MAX {
+                    return self.give_up("the vehicle did not come to the goal".into());
                 }
             }
             FlyMode::Mission => {
@@ -72,11 +86,20 @@ impl Flight {
 
     fn plan_anew(&mut self, time: f64) {
         let Some(replan) = self.settings.replan else { return };
-        let is_busy = self.job.is_some() || self.next.is_some() || self.update.is_some();
-        if is_busy || time - self.flying.made < replan.interval_s {
+        if self.job.is_some() || self.next.is_some() || self.update.is_some() {
             return;
         }
-        let Some(job) = rest(self.jobs + 1, &self.world, &self.flying.plan, time + replan.lead_s) else {
+        let (world, plan) = (&self.world, &self.flying.plan);
+        let prompt = replan.prompt_lead_s.filter(|_| self.is_news && self.settings.mode == FlyMode::Guided);
+        let is_due = time - self.flying.made >= replan.interval_s;
+        let job = match prompt {
+            Some(lead) => rest_at(self.jobs + 1, world, plan, time + lead),
+            // A mission takes over when it has been delivered.
+            None if is_due => rest(self.jobs + 1, world, plan, time + replan.lead_s + self.delivery_s),
+            None => return,
+        };
+        self.is_news = false;
+        let Some(job) = job else {
             // Too little is left: the plan is good to its end.
             self.flying.made = time;
             return;
@@ -93,7 +116,8 @@ impl Flight {
             Err(Rejected::Stale) => self.job = Some((job, asked)),
             Err(why) => self.say(Level::Warn, format!("the plan for {:.1} s does not fly: {why}", job.seam)),
             Ok((plan, curve)) if matches!(self.phase, Phase::Fly) => {
-                let next = Flying { plan, curve, made: time, nodes: Vec::new() };
+                let budgets = job.scenario.agents.first().map(|agent| (agent.jammer, agent.dropout));
+                let next = Flying { plan, curve, made: time, nodes: Vec::new(), budgets };
                 match self.settings.mode {
                     FlyMode::Guided => self.next = Some(next),
                     FlyMode::Mission => self.begin_update(next),
@@ -103,9 +127,24 @@ impl Flight {
         }
     }
 
-    /// Sends the rest of the mission by a new plan.
+    /// A new plan flies. What is spent before it is spent: its budgets are those of the rest.
+    fn take_over(&mut self, next: Flying) {
+        if let (Some((jammer, dropout)), Some(agent)) = (next.budgets, self.world.agents.first_mut()) {
+            (agent.jammer, agent.dropout) = (jammer, dropout);
+        }
+        self.flying = next;
+    }
+
+    /// Sends the rest of the mission: what the plan that flies still does up to the seam, then the new plan.
     fn begin_update(&mut self, mut next: Flying) {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
+        let now = self.mission_time();
+        let plan = joined(&self.flying.plan, &next.plan, now);
+        let Some(curve) = plan.as_ref().and_then(|plan| Curve::of(plan, &self.agent)) else {
+            return self.say(Level::Warn, "a plan does not continue the one that flies");
+        };
+        next.budgets = plan.as_ref().and_then(|plan| budgets_at(&self.world, &self.flying.plan, plan.start_time));
+        (next.plan, next.curve) = (plan.unwrap_or_default(), curve);
         let mut mission = match self.mission_of(&next.plan) {
             Ok(mission) => mission,
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
@@ -115,7 +154,18 @@ impl Flight {
         next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));
-        self.next = Some(next);
+        (self.next, self.update_begun) = (Some(next), self.now);
+    }
+
+    /// The item of a new mission that flies to the node that the vehicle is flying to, and since when.
+    fn item_to_go_on_at(&self, vehicle: &Vehicle, next: &Flying) -> (u16, Time) {
+        let (now, times) = (self.mission_time(), next.plan.node_times());
+        let node = times.iter().position(|time| *time >= now - NODE_TOLERANCE).unwrap_or(times.len()).max(1);
+        // Item 0 of ArduPilot is home.
+        let first = usize::from(vehicle.autopilot == Autopilot::ArduPilot);
+        let item = next.nodes.iter().skip(first).position(|of| *of >= node).unwrap_or_default() + first;
+        let since = self.item.map_or(self.now, |(_, since)| since);
+        (u16::try_from(item).unwrap_or(u16::MAX), since)
     }
 
     fn advance_update(&mut self, vehicle: &Vehicle) {
@@ -124,18 +174,16 @@ impl Flight {
         update.poll(self.now, &mut out);
         let result = update.result();
         self.send(out);
+        // Not only when it is proved: an autopilot that was given a new list may begin it anew.
+        if update.is_accepted() || matches!(result, Some(Ok(_))) {
+            self.go_on_by_new_mission(vehicle);
+        }
         match result {
             None => self.update = Some(update),
             Some(Ok(delivered)) => {
                 let kept = update.items().to_vec();
                 self.watch_over(Watch::new(self.talk(vehicle.identity, List::Mission), delivered), kept);
-                // Autopilots disagree on what they keep: the item is always said. Item 0 of ArduPilot is home.
-                let first = u16::from(vehicle.autopilot == Autopilot::ArduPilot);
-                self.commands.submit(self.now, vehicle.identity, Command::set_current(first));
-                if let Some(next) = self.next.take() {
-                    self.flying = next;
-                    self.item = Some((first, self.now));
-                }
+                self.delivery_s = self.now.since(self.update_begun).as_secs_f64();
                 self.say(Level::Info, format!("the rest of the mission was replaced: {} items", delivered.count));
             }
             Some(Err(failure)) => {
@@ -143,6 +191,19 @@ impl Flight {
                 self.give_up(format!("the rest of the mission was not delivered: {failure}"));
             }
         }
+    }
+
+    /// The autopilot has the new mission: it is told where to go on.
+    fn go_on_by_new_mission(&mut self, vehicle: &Vehicle) {
+        let Some(next) = self.next.take() else { return };
+        // Autopilots disagree on what they keep: the item is always said.
+        let (item, since) = self.item_to_go_on_at(vehicle, &next);
+        let command = Command::set_current(item);
+        self.commands.submit(self.now, vehicle.identity, command);
+        // Twice, for half a second in the wrong direction is what a lost one costs.
+        self.send(vec![command.long(vehicle.identity, 0)]);
+        self.take_over(next);
+        (self.item, self.expected) = (Some((item, since)), Some((item, self.now)));
     }
 
     /// There is no plan to fly any more.

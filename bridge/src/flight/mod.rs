@@ -43,6 +43,7 @@ use crate::link::dialect::MavMessage;
 use crate::link::{Frame, Identity};
 use crate::mission::{Delivery, Download, Item, List, Pace, Talk, Watch};
 use crate::payload::{Radiation, Relay};
+use crate::replan::job::Budgets;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
@@ -54,6 +55,8 @@ pub use settings::{FlyMode, OnFailure, Settings};
 const HEARTBEAT: Duration = Duration::from_secs(1);
 /// Time between two requests of the same mode.
 const MODE_AGAIN: Duration = Duration::from_secs(1);
+/// How old a position may be before it is asked for again.
+const FIX_MAX: Duration = Duration::from_secs(2);
 /// Longest that leaving takes.
 const LEAVE_MAX: Duration = Duration::from_secs(3);
 
@@ -137,6 +140,8 @@ struct Flying {
     made: f64,
     /// For each item of the mission the node that it flies to; empty where the bridge steers.
     nodes: Vec<usize>,
+    /// Jammer and dropout with what is left of their budgets where the plan begins; the scenario's own where not given.
+    budgets: Option<Budgets>,
 }
 
 /// A flight. See the [module](self).
@@ -163,15 +168,25 @@ pub struct Flight {
     next: Option<Flying>,
     /// A mission on its way while the one before it is flown.
     update: Option<Box<Delivery>>,
+    update_begun: Time,
+    /// How long the last mission took to be delivered, s.
+    delivery_s: f64,
     /// The clock's time at the start time of the scenario.
     zero: Option<Time>,
     /// In mission mode: the item that is flown to, and since when.
     item: Option<(u16, Time)>,
+    /// An item that the vehicle was told to go on at, and when.
+    expected: Option<(u16, Time)>,
+    /// An item before the one that is flown to, said once.
+    doubt: Option<u16>,
     job: Option<(Box<Job>, Time)>,
     jobs: u64,
+    /// An observation came that no plan knows of.
+    is_news: bool,
     heartbeat: Option<Time>,
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
+    intervals_asked: Time,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -227,16 +242,22 @@ impl Flight {
             kept: Vec::new(),
             check: None,
             phase: Phase::Connect,
-            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new() },
+            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None },
             next: None,
             update: None,
+            update_begun: Time::ZERO,
+            delivery_s: 0.0,
             zero: None,
             item: None,
+            expected: None,
+            doubt: None,
             job: None,
             jobs: 0,
+            is_news: false,
             heartbeat: None,
             setpoint: None,
             mode_asked: None,
+            intervals_asked: Time::ZERO,
             link_lost: false,
             out: Vec::new(),
         })
@@ -327,9 +348,7 @@ impl Flight {
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);
-            for (message, hertz) in INTERVALS {
-                self.commands.submit(self.now, vehicle.identity, Command::interval(message, hertz));
-            }
+            self.ask_for_intervals(vehicle.identity);
         }
         let mut out = Vec::new();
         if let MavMessage::TIMESYNC(data) = &frame.message
@@ -366,8 +385,9 @@ impl Flight {
     fn observe(&mut self, observation: &Observation) {
         let sigma_max = self.settings.replan.map_or(f64::MAX, |replan| replan.sigma_max);
         let now = self.scenario_time();
-        if let Err(why) = observation.apply(&mut self.world, now, sigma_max) {
-            self.say(Level::Warn, format!("an observation of {why}"));
+        match observation.apply(&mut self.world, now, sigma_max) {
+            Ok(()) => self.is_news = true,
+            Err(why) => self.say(Level::Warn, format!("an observation of {why}")),
         }
     }
 
@@ -390,6 +410,23 @@ impl Flight {
         self.send(silence);
         self.phase = Phase::Ended;
         self.out.push(Output::End(end));
+    }
+
+    fn ask_for_intervals(&mut self, vehicle: Identity) {
+        self.intervals_asked = self.now;
+        for (message, hertz) in INTERVALS {
+            self.commands.submit(self.now, vehicle, Command::interval(message, hertz));
+        }
+    }
+
+    /// A vehicle that is heard and does not say where it is has begun anew, or never heard the question.
+    fn ask_again_for_intervals(&mut self, vehicle: &Vehicle) {
+        let is_stale = vehicle.fix.is_none_or(|fix| self.now.since(fix.heard) > FIX_MAX);
+        let is_due = self.now.since(self.intervals_asked) > FIX_MAX;
+        if is_stale && is_due && self.now.since(vehicle.heard) < FIX_MAX && self.commands.under_way() == 0 {
+            self.say(Level::Warn, "the vehicle does not say where it is: asking again");
+            self.ask_for_intervals(vehicle.identity);
+        }
     }
 
     /// Asks for a mode, again and again until the vehicle has it.
@@ -421,6 +458,7 @@ impl Flight {
         }
         let mut out = Vec::new();
         self.timesync.poll(self.now, vehicle.identity, &mut out);
+        self.ask_again_for_intervals(&vehicle);
         let unanswered = self.commands.poll(self.now, self.round_trip, &mut out);
         self.send(out);
         for ended in unanswered {

@@ -19,6 +19,8 @@ use super::{End, Flight, Level, Phase, schedule};
 const HEIGHT_MIN: f64 = 1.0;
 /// How long setpoints are sent before the mode that follows them is asked for.
 const STREAM_FIRST: Duration = Duration::from_secs(1);
+/// How long a vehicle may take to go on at the item that it was told.
+const EXPECT_MAX: Duration = Duration::from_secs(3);
 /// Speed below which a vehicle has arrived, m/s.
 const SPEED_MAX: f64 = 1.0;
 
@@ -99,6 +101,7 @@ impl Flight {
             self.phase = Phase::Ready;
             return;
         };
+        self.update_begun = self.now;
         let talk = self.talk(vehicle.identity, list);
         let delivery = Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace()));
         self.phase = Phase::Deliver { delivery, waiting };
@@ -116,6 +119,7 @@ impl Flight {
             Some(Ok(delivered)) => {
                 self.say(Level::Info, format!("the autopilot holds the {list}: {} items", delivered.count));
                 if list == List::Mission {
+                    self.delivery_s = self.now.since(self.update_begun).as_secs_f64();
                     self.watch_over(Watch::new(self.talk(vehicle.identity, list), delivered), kept);
                 }
                 self.next_delivery(vehicle, waiting);
@@ -213,13 +217,52 @@ impl Flight {
 
     /// Takes note of where the mission is, and of others who replace it.
     pub(super) fn follow_mission(&mut self, frame: &Frame) {
-        if let (MavMessage::MISSION_CURRENT(data), Phase::Fly) = (&frame.message, &self.phase)
-            && self.telemetry.vehicle().is_some_and(|vehicle| vehicle.identity == frame.from)
-            && self.item.is_none_or(|(item, _)| item != data.seq)
-        {
-            self.item = Some((data.seq, self.now));
+        let is_vehicle = self.telemetry.vehicle().is_some_and(|vehicle| vehicle.identity == frame.from);
+        if is_vehicle && matches!(self.phase, Phase::Fly) {
+            match &frame.message {
+                MavMessage::MISSION_CURRENT(data) => self.current_is(data.seq),
+                // Some say what is flown to now when they next say it, and this at once.
+                MavMessage::MISSION_ITEM_REACHED(data) => {
+                    let next = data.seq.saturating_add(1);
+                    let is_ahead = self.item.is_none_or(|(item, _)| next > item);
+                    if is_ahead && self.node_of(next).is_some() {
+                        self.current_is(next);
+                    }
+                }
+                _ => {}
+            }
         }
         self.watch_mission(frame);
+    }
+
+    fn node_of(&self, item: u16) -> Option<usize> {
+        self.flying.nodes.get(usize::from(item)).copied()
+    }
+
+    /// The vehicle says which item it flies to.
+    fn current_is(&mut self, seq: u16) {
+        let node = self.node_of(seq);
+        if let Some((first, since)) = self.expected {
+            // Numbers of the list before are on their way still.
+            if node != self.node_of(first) && self.now.since(since) < EXPECT_MAX {
+                return;
+            }
+            self.expected = None;
+        }
+        let is_same = self.item.is_some_and(|(item, _)| item == seq || self.node_of(item) == node);
+        if is_same {
+            self.doubt = None;
+            self.item = self.item.map(|(_, since)| (seq, since));
+            return;
+        }
+        // Going back is believed when it is said twice: frames overtake each other. And never while a new list is on its
+        // way: it may be there already, and begun anew.
+        let is_back = self.item.is_some_and(|(item, _)| seq < item);
+        if is_back && (self.next.is_some() || self.doubt.replace(seq) != Some(seq)) {
+            return;
+        }
+        self.doubt = None;
+        self.item = Some((seq, self.now));
     }
 }
 

@@ -86,23 +86,27 @@ pub fn insert(
 ) -> Vec<Item> {
     let outputs: Vec<(&PayloadEntry, MissionOutput)> =
         payloads.iter().filter_map(|entry| Some((entry, entry.mission_output?))).collect();
-    let mut now: Vec<f64> = outputs.iter().map(|(entry, _)| rest(entry.kind)).collect();
+    // The rest of a mission begins with whatever the mission before it left on.
+    let is_whole = items.iter().any(|item| item.command == MavCmd::MAV_CMD_NAV_TAKEOFF);
+    let mut now: Vec<Option<f64>> = outputs.iter().map(|(entry, _)| is_whole.then(|| rest(entry.kind))).collect();
+    let differs = |now: Option<f64>, wanted: f64| now.is_none_or(|now| (wanted - now).abs() > LEVEL_STEP);
     let mut out = Vec::with_capacity(items.len());
     for (wire, node) in items.into_iter().zip(nodes) {
         // Before the first node nothing is emitted, and home is no place that is flown to.
         if wire.command == MavCmd::MAV_CMD_NAV_WAYPOINT && *node > 0 {
             for ((entry, output), now) in outputs.iter().zip(&mut now) {
-                let wanted = level(entry, radiation, plan, *node).filter(|wanted| (wanted - *now).abs() > LEVEL_STEP);
+                let wanted = level(entry, radiation, plan, *node).filter(|wanted| differs(*now, *wanted));
                 if let Some(wanted) = wanted {
                     out.extend(item(autopilot, output, wanted));
-                    *now = wanted;
+                    *now = Some(wanted);
                 }
             }
         }
         out.push(wire);
     }
     for ((entry, output), now) in outputs.iter().zip(now) {
-        if (now - rest(entry.kind)).abs() > LEVEL_STEP {
+        let may = entry.kind == PayloadKind::Transmitter || radiation == Radiation::Armed;
+        if may && differs(now, rest(entry.kind)) {
             out.extend(item(autopilot, output, rest(entry.kind)));
         }
     }
@@ -139,13 +143,17 @@ mod tests {
     #[test]
     fn outputs_change_before_the_node_that_they_are_for_and_rest_at_the_end() {
         let plan = AgentPlan { jam: Some(vec![1.0, 0.0, 0.5, 0.5]), ..AgentPlan::default() };
-        let items = vec![waypoint(); 5];
+        let mut items = vec![waypoint(); 5];
         // ArduPilot: home, then nodes 0 to 3.
         let nodes = [0, 0, 1, 2, 3];
         let jammer = [entry(PayloadKind::Jammer, 9)];
+        let rest = insert(Autopilot::ArduPilot, items.clone(), &nodes, &jammer, Radiation::Armed, &plan);
+        items[1].command = MavCmd::MAV_CMD_NAV_TAKEOFF;
         let with = |radiation| insert(Autopilot::ArduPilot, items.clone(), &nodes, &jammer, radiation, &plan);
         let (way, half, off) = ((16, 0.0, 0.0), (183, 9.0, 1500.0), (183, 9.0, 1000.0));
-        assert_eq!(commands(&with(Radiation::Armed)), [way, way, way, half, way, way, off]);
+        let up = (22, 0.0, 0.0);
+        assert_eq!(commands(&with(Radiation::Armed)), [way, up, way, half, way, way, off]);
+        assert_eq!(commands(&rest), [way, way, off, way, half, way, way, off], "what was on may be on still");
         assert_eq!(with(Radiation::Off), items, "unarmed");
         assert_eq!(quiet(Autopilot::ArduPilot, &jammer, Radiation::Off), []);
         let quiet = quiet(Autopilot::ArduPilot, &jammer, Radiation::Armed);

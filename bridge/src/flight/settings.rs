@@ -64,6 +64,9 @@ pub struct Replanning {
     pub interval_s: f64,
     /// How far ahead a plan takes over, s: longer than planning takes.
     pub lead_s: f64,
+    /// How far ahead a plan takes over that an observation asks for at once, s: longer than planning takes. Observations
+    /// wait for the next interval where not given, and always in mission mode.
+    pub prompt_lead_s: Option<f64>,
     /// How long planning may take, s.
     pub deadline_s: f64,
     /// How long a plan is flown at most, s, counted from when it was made.
@@ -74,7 +77,14 @@ pub struct Replanning {
 
 impl Default for Replanning {
     fn default() -> Self {
-        Self { interval_s: 10.0, lead_s: 3.0, deadline_s: 2.0, time_to_live_s: 30.0, sigma_max: f64::MAX }
+        Self {
+            interval_s: 10.0,
+            lead_s: 3.0,
+            prompt_lead_s: None,
+            deadline_s: 2.0,
+            time_to_live_s: 30.0,
+            sigma_max: f64::MAX,
+        }
     }
 }
 

@@ -1,5 +1,5 @@
 //! Where a link leads: `serial:DEVICE[:BAUD]`, `udpin:HOST:PORT`, `udpout:HOST:PORT`, `tcpin:HOST:PORT`,
-//! `tcpout:HOST:PORT`.
+//! `tcpout:HOST:PORT`, `pty:PATH`.
 //!
 //! | scheme | what |
 //! |---|---|
@@ -8,6 +8,7 @@
 //! | `udpout` | sends datagrams to an address |
 //! | `tcpin` | waits on a local address for connections, and answers whoever the vehicle is |
 //! | `tcpout` | connects to an address |
+//! | `pty` | makes a pseudo-terminal, whose other end is at the path: a serial line for simulated vehicles |
 
 use std::fmt;
 use std::str::FromStr;
@@ -33,6 +34,8 @@ pub enum Address {
     TcpIn(String),
     /// Connects to an address, `HOST:PORT`.
     TcpOut(String),
+    /// Makes a pseudo-terminal, whose other end is a serial device at this path.
+    Pty(String),
 }
 
 /// An address that cannot be read: says what is wrong and what would be right.
@@ -65,6 +68,8 @@ impl FromStr for Address {
             "udpout" => host_port(rest).map(Self::UdpOut).map_err(fail),
             "tcpin" => host_port(rest).map(Self::TcpIn).map_err(fail),
             "tcpout" => host_port(rest).map(Self::TcpOut).map_err(fail),
+            "pty" if rest.is_empty() => Err(fail("`pty:` names no path".to_owned())),
+            "pty" => Ok(Self::Pty(rest.to_owned())),
             _ => Err(fail(format!("`{scheme}` is no kind of link"))),
         }
     }
@@ -99,6 +104,7 @@ impl fmt::Display for Address {
             Self::UdpOut(to) => write!(f, "udpout:{to}"),
             Self::TcpIn(at) => write!(f, "tcpin:{at}"),
             Self::TcpOut(to) => write!(f, "tcpout:{to}"),
+            Self::Pty(path) => write!(f, "pty:{path}"),
         }
     }
 }
@@ -109,7 +115,9 @@ mod tests {
 
     #[test]
     fn addresses_read_and_print_the_same() {
-        for text in ["serial:/dev/ttyACM0:921600", "udpin:0.0.0.0:14550", "udpout:[::1]:14540", "tcpin:h:1"] {
+        for text in
+            ["serial:/dev/ttyACM0:921600", "udpin:0.0.0.0:14550", "udpout:[::1]:14540", "tcpin:h:1", "pty:/tmp/a"]
+        {
             assert_eq!(text.parse::<Address>().expect(text).to_string(), text);
         }
         let by_path = "serial:/dev/serial/by-path/usb-0:1.0-port".parse::<Address>().expect("colons in the path");
@@ -124,6 +132,7 @@ mod tests {
             ("udpin:14550", "`14550` is not HOST:PORT"),
             ("tcpout:host:99999", "`host:99999` is not HOST:PORT"),
             ("serial:", "`serial:` names no device"),
+            ("pty:", "`pty:` names no path"),
             ("serial:/dev/x:99999999999", "`99999999999` is too large"),
         ];
         for (text, says) in cases {

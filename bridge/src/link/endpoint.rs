@@ -49,7 +49,8 @@ pub struct Endpoint {
     identity: Identity,
     accept: Accept,
     signing: Option<Signing>,
-    sequence: u8,
+    /// The next sequence number of each component that speaks here.
+    sequences: BTreeMap<u8, u8>,
     decoders: BTreeMap<Source, Decoder>,
     peer: Option<(Source, Time)>,
     statistics: Statistics,
@@ -60,7 +61,7 @@ impl Endpoint {
     #[must_use]
     pub fn new(identity: Identity, accept: Accept) -> Self {
         let (decoders, statistics) = (BTreeMap::new(), Statistics::default());
-        Self { identity, accept, signing: None, sequence: 0, decoders, peer: None, statistics }
+        Self { identity, accept, signing: None, sequences: BTreeMap::new(), decoders, peer: None, statistics }
     }
 
     /// The same end, signing what it sends and refusing what is not signed.
@@ -99,13 +100,19 @@ impl Endpoint {
 
     /// A message as a frame.
     pub fn encode(&mut self, now: Time, message: &MavMessage) -> Vec<u8> {
-        let sequence = self.sequence;
-        self.sequence = sequence.wrapping_add(1);
+        self.encode_as(now, self.identity.component, message)
+    }
+
+    /// A message of another component of the same system as a frame: for a vehicle whose payloads speak over one link.
+    pub fn encode_as(&mut self, now: Time, component: u8, message: &MavMessage) -> Vec<u8> {
+        let identity = Identity { component, ..self.identity };
+        let next = self.sequences.entry(component).or_insert(0);
+        let sequence = std::mem::replace(next, next.wrapping_add(1));
         self.statistics.frames_out += 1;
         let raw = match &mut self.signing {
-            None => codec::plain(self.identity, sequence, message),
+            None => codec::plain(identity, sequence, message),
             Some(signing) => {
-                let mut raw = codec::signable(self.identity, sequence, message);
+                let mut raw = codec::signable(identity, sequence, message);
                 signing.sign(now, &mut raw);
                 raw
             }

@@ -56,6 +56,7 @@ pub(super) fn open(address: &Address) -> io::Result<Halves> {
         Address::UdpOut(to) => udp_out(to),
         Address::TcpIn(at) => tcp_in(at),
         Address::TcpOut(to) => tcp_out(to),
+        Address::Pty(path) => pseudo_terminal(path),
     }
 }
 
@@ -115,6 +116,52 @@ impl Receive for SerialReceiver {
 impl Transmit for SerialTransmitter {
     fn transmit(&self, bytes: &[u8], _: Source) -> io::Result<()> {
         lock(&self.0).write_all(bytes)
+    }
+}
+
+/// The near end of a pseudo-terminal. The far end stays open here too: without a user it is a line without a listener, not
+/// a line that is gone.
+#[cfg(unix)]
+struct PseudoTerminal {
+    near: SerialReceiver,
+    _far: serialport::TTYPort,
+    path: std::path::PathBuf,
+}
+
+#[cfg(unix)]
+fn pseudo_terminal(path: &str) -> io::Result<Halves> {
+    let (mut near, far) = serialport::TTYPort::pair()?;
+    near.set_timeout(WAIT)?;
+    let mut writer = near.try_clone()?;
+    writer.set_timeout(WRITE_TIMEOUT)?;
+    let name = far.name().ok_or_else(|| io::Error::new(ErrorKind::NotFound, "the pseudo-terminal has no name"))?;
+    // One that a process left behind leads nowhere.
+    let is_left = std::fs::symlink_metadata(path).is_ok_and(|found| found.is_symlink());
+    if is_left && !std::path::Path::new(path).exists() {
+        std::fs::remove_file(path)?;
+    }
+    std::os::unix::fs::symlink(name, path)?;
+    let near = SerialReceiver(Box::new(near));
+    let receiver = PseudoTerminal { near, _far: far, path: path.into() };
+    Ok((Box::new(receiver), Arc::new(SerialTransmitter(Mutex::new(writer)))))
+}
+
+#[cfg(not(unix))]
+fn pseudo_terminal(_: &str) -> io::Result<Halves> {
+    Err(io::Error::new(ErrorKind::Unsupported, "this system has no pseudo-terminals"))
+}
+
+#[cfg(unix)]
+impl Receive for PseudoTerminal {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<Option<(usize, Source)>> {
+        self.near.receive(buffer)
+    }
+}
+
+#[cfg(unix)]
+impl Drop for PseudoTerminal {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
     }
 }
 

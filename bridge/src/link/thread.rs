@@ -143,7 +143,17 @@ impl Link {
 
     /// Hands a message to the device and returns at once. What nobody can hear yet is dropped.
     pub fn send(&mut self, message: &MavMessage) {
-        let bytes = self.endpoint.encode(self.clock.now(), message);
+        let bytes = self.encode_as(self.endpoint.identity().component, message);
+        self.forward(bytes);
+    }
+
+    /// The frame of a message that another component of this system sends: see [`Endpoint::encode_as`].
+    pub fn encode_as(&mut self, component: u8, message: &MavMessage) -> Vec<u8> {
+        self.endpoint.encode_as(self.clock.now(), component, message)
+    }
+
+    /// Hands bytes that are framed already to the device and returns at once.
+    pub fn forward(&mut self, bytes: Vec<u8>) {
         let to = self.endpoint.peer().unwrap_or(Source::Line);
         if let Some(outgoing) = &self.outgoing
             && let Err(TrySendError::Full(_)) = outgoing.try_send((to, bytes))
@@ -159,12 +169,12 @@ impl Link {
             if let Some(event) = self.decoded.pop_front() {
                 return Some(event);
             }
-            let incoming = match self.incoming.recv_timeout(until.since(self.clock.now())) {
+            let incoming = match self.incoming.recv_timeout(self.clock.real(until.since(self.clock.now()))) {
                 Ok(incoming) => incoming,
                 Err(RecvTimeoutError::Timeout) => return None,
                 Err(RecvTimeoutError::Disconnected) => {
                     // The receiving thread never ends by itself; should it, its owner must not spin.
-                    std::thread::sleep(until.since(self.clock.now()));
+                    std::thread::sleep(self.clock.real(until.since(self.clock.now())));
                     return None;
                 }
             };

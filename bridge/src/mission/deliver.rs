@@ -39,6 +39,7 @@ pub struct Delivery {
     items: Vec<Item>,
     step: Step,
     tries: u32,
+    is_accepted: bool,
     result: Option<Result<Delivered, Failure>>,
 }
 
@@ -47,13 +48,19 @@ impl Delivery {
     #[must_use]
     pub fn new(talk: Talk, autopilot: Autopilot, items: Vec<Item>, pace: Pace) -> Self {
         let step = Step::Upload(Upload::new(talk, items.clone(), pace));
-        Self { talk, autopilot, items, step, tries: 1, result: None }
+        Self { talk, autopilot, items, step, tries: 1, is_accepted: false, result: None }
     }
 
     /// How it ended; `None` while it goes on.
     #[must_use]
     pub const fn result(&self) -> Option<Result<Delivered, Failure>> {
         self.result
+    }
+
+    /// Whether the autopilot said that it took the list, which is not proved yet.
+    #[must_use]
+    pub const fn is_accepted(&self) -> bool {
+        self.is_accepted
     }
 
     /// The list.
@@ -102,7 +109,8 @@ impl Delivery {
         match &self.step {
             Step::Upload(upload) => match upload.result() {
                 None => {}
-                Some(Ok(Accepted::Yes { .. } | Accepted::Unknown)) => {
+                Some(Ok(accepted)) => {
+                    self.is_accepted = matches!(accepted, Accepted::Yes { .. });
                     let mut download = Download::new(self.talk, upload.pace());
                     download.poll(now, out);
                     self.step = Step::ReadBack(download);
@@ -136,7 +144,7 @@ impl Delivery {
             self.result = Some(Err(failure));
             return;
         }
-        self.tries += 1;
+        (self.tries, self.is_accepted) = (self.tries + 1, false);
         self.step = Step::Upload(Upload::new(self.talk, self.items.clone(), pace));
     }
 }

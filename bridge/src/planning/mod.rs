@@ -3,6 +3,7 @@
 //! | function | what |
 //! |---|---|
 //! | [`plan`] | a plan of a scenario |
+//! | [`roll()`] | a plan in steps, with every step |
 //! | [`improve`] | the same, from an earlier plan |
 //! | [`assess()`] | objective, violations and series of a plan, in double precision, from its written numbers alone |
 //! | [`landscape()`] | a metric over the domain at one time |
@@ -14,13 +15,16 @@
 mod assess;
 mod landscape;
 mod obstacle;
+mod roll;
 mod solve;
 
 pub use assess::{AgentSeries, Assessment, assess};
 pub use landscape::{Grid, View, landscape};
 pub use obstacle::Obstacle;
+pub use roll::{Rolled, Step, roll, roll_through};
 pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};
 
+pub use quietpath_core::horizon::Choice;
 pub use quietpath_core::solver::{Extent, Status};
 
 use quietpath_core::metrics::Sample;

@@ -6,7 +6,7 @@ use quietpath_core::solver::{self, Settings, Start, Status, Workspace};
 use quietpath_core::{Point, Real};
 
 use super::assess::trajectory;
-use super::{Assessment, Obstacle, assess};
+use super::{Assessment, Obstacle, assess, roll};
 use crate::capacity::{AGENTS, HostTrajectory, NODES, SENSORS};
 use crate::file::plan::{AgentPlan, PlanTiming};
 use crate::file::{FileError, PlanFile, ScenarioFile};
@@ -27,7 +27,7 @@ pub enum Precision {
 /// What to do with a scenario that asks to be planned in steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rollout {
-    /// As the scenario says. Steps are not planned by this version, and so are refused.
+    /// As the scenario says: in the steps of its `[rolling]`, and otherwise in one piece.
     #[default]
     AsWritten,
     /// In one piece, with every track known.
@@ -41,7 +41,8 @@ pub struct Options {
     pub precision: Precision,
     /// Largest number of iterations; the planner's own choice where it is not given.
     pub iterations: Option<usize>,
-    /// Time after which the best plan so far is returned. With one, the same call may give different plans.
+    /// Time after which the best plan so far is returned, of each step where there are steps. With one, the same call may
+    /// give different plans.
     pub deadline: Option<Duration>,
     /// Steps or one piece.
     pub rollout: Rollout,
@@ -64,7 +65,8 @@ pub struct Planned {
     pub evaluations: usize,
 }
 
-/// Plans a scenario, from the best of several starts.
+/// Plans a scenario, from the best of several starts; in steps where it says so and [`Options::rollout`] leaves it to the
+/// scenario, as [`roll()`] does.
 ///
 /// `plan_seconds` of the plan is the time of the core's planning call alone. The objective is not what the core
 /// computed on its way, but what the plan as written is worth in double precision: in single precision the
@@ -73,10 +75,13 @@ pub struct Planned {
 /// # Errors
 /// A part of the scenario that this version does not plan, by its place in the file.
 pub fn plan(scenario: &ScenarioFile, options: &Options) -> Result<Planned, Box<FileError>> {
+    if scenario.rolling.is_some() && options.rollout == Rollout::AsWritten {
+        return roll(scenario, options, &mut |_| ()).map(Planned::from);
+    }
     begin(scenario, options, None)
 }
 
-/// Plans a scenario from an earlier plan, such as that of a scenario nearby.
+/// Plans a scenario in one piece from an earlier plan, such as that of a scenario nearby.
 ///
 /// What comes out is no worse than the earlier plan where that is feasible in this scenario; where it is not, or has
 /// another number of intervals, this is [`plan`].
@@ -89,7 +94,6 @@ pub fn improve(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -
 }
 
 fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>) -> Result<Planned, Box<FileError>> {
-    refuse_unplanned(scenario, options)?;
     let Solved { mut plan, status, obstacle, iterations, evaluations } =
         super::on_large_stack(|| match (options.precision, scenario.dimension) {
             (Precision::F32, 3) => solve::<f32, 3>(scenario, options, earlier),
@@ -100,15 +104,6 @@ fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>)
     let assessment = assess(scenario, &plan, "the plan")?;
     plan.objective = Some(assessment.objective);
     Ok(Planned { plan, assessment, status, obstacle, iterations, evaluations })
-}
-
-/// Refuses what the file can say and the core cannot hear; the core refuses the rest itself.
-fn refuse_unplanned(scenario: &ScenarioFile, options: &Options) -> Result<(), Box<FileError>> {
-    if scenario.rolling.is_some() && options.rollout == Rollout::AsWritten {
-        let help = "plan it in one piece, with every track known: `quietpath plan --once`, or leave [rolling] out";
-        return Err(scenario.error_at("rolling", "asks for planning in steps, which this version does not do", help));
-    }
-    Ok(())
 }
 
 /// What the core says, its dimension and precision left behind.
@@ -126,17 +121,12 @@ fn solve<T: Real, const DIM: usize>(
     earlier: Option<&PlanFile>,
 ) -> Result<Solved, Box<FileError>> {
     let problem = scenario.to_core::<T, DIM>()?;
-    let mut settings = Settings::<T>::default();
-    if let Some(iterations) = options.iterations {
-        settings.iterations = iterations;
-        settings.refinements = settings.refinements.min(iterations);
-    }
     let mut workspace: Box<HostWorkspace<T, DIM>> = Box::new(Workspace::new());
     let earlier = earlier.map(trajectory::<T, DIM>).transpose().map_err(|error| scenario.explain(&error))?;
     let start = earlier.as_deref().map_or(Start::Global, Start::Given);
     let begin = Instant::now();
     let mut is_late = || options.deadline.is_some_and(|deadline| begin.elapsed() >= deadline);
-    let outcome = solver::plan(&problem.view(), &settings, start, &mut workspace, &mut is_late);
+    let outcome = solver::plan(&problem.view(), &settings(options), start, &mut workspace, &mut is_late);
     let plan_seconds = begin.elapsed().as_secs_f64();
     let outcome = outcome.map_err(|error| scenario.explain(&error))?;
     let plan = PlanFile {
@@ -148,8 +138,21 @@ fn solve<T: Real, const DIM: usize>(
     Ok(Solved { plan, status, obstacle, iterations: outcome.iterations, evaluations: outcome.evaluations })
 }
 
-/// A trajectory of the planner's equal intervals as a plan.
-fn written<T: Real, const DIM: usize>(scenario: &ScenarioFile, trajectory: &HostTrajectory<T, DIM>) -> PlanFile {
+/// The planner's bounds on its work.
+pub(super) fn settings<T: Real>(options: &Options) -> Settings<T> {
+    let mut settings = Settings::default();
+    if let Some(iterations) = options.iterations {
+        settings.iterations = iterations;
+        settings.refinements = settings.refinements.min(iterations);
+    }
+    settings
+}
+
+/// A trajectory as a plan of equal intervals that begins with the scenario.
+pub(super) fn written<T: Real, const DIM: usize>(
+    scenario: &ScenarioFile,
+    trajectory: &HostTrajectory<T, DIM>,
+) -> PlanFile {
     let nodes = trajectory.nodes();
     let doubles = |values: &[T]| -> Vec<f64> { values.iter().take(nodes).map(|value| value.to_f64()).collect() };
     let point = |position: &Point<T, DIM>| -> Vec<f64> { position.iter().map(|part| part.to_f64()).collect() };

@@ -7,6 +7,7 @@
 //!
 //! Limits: one agent.
 
+use quietpath_core::scenario::{Dropout, Jammer};
 use serde::{Deserialize, Serialize};
 
 use crate::file::scenario::ScenarioFile;
@@ -18,8 +19,13 @@ const INTERVALS_MIN: usize = 4;
 /// How far a plan may begin from where the flying plan is at the seam, as a share of the way flown in one of its
 /// intervals.
 const SEAM_TOLERANCE: f64 = 0.05;
+/// Relative difference of intervals that are the same.
+const EVEN_TOLERANCE: f64 = 1e-6;
 /// Budgets below this are none, s.
 const BUDGET_MIN: f64 = 1e-9;
+
+/// An agent's jammer and dropout.
+pub type Budgets = (Option<Jammer<f64>>, Option<Dropout<f64>>);
 
 /// A problem for the planner.
 #[derive(Clone, Debug)]
@@ -81,49 +87,143 @@ pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, earliest: f64)
     let first = times.iter().position(|time| *time >= earliest)?;
     let (seam, last) = (times.get(first).copied()?, times.last().copied()?);
     let intervals = times.len().checked_sub(first + 1)?;
-    if intervals < INTERVALS_MIN {
-        return None;
-    }
     let agent_plan = flying.agents.first()?;
     let curve = Curve::of(flying, &agent_plan.name)?;
-    let at = curve.sample(seam);
+    let interval = (last - seam) / intervals as f64;
+    // Nodes of unequal times are not those of a new plan: the curve between them is.
+    let sampled = || (0..=intervals).map(|node| curve.sample(seam + interval * node as f64).position).collect();
+    let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
+    let mut steps =
+        times.windows(2).skip(first).map(|pair| pair.last().zip(pair.first()).map_or(0.0, |(b, a)| b - a));
+    let is_even = steps.all(|step| (step - interval).abs() <= EVEN_TOLERANCE * interval);
+    let mut path: Vec<Vec<f64>> = if is_even { nodes() } else { sampled() };
+    path.first_mut()?.clone_from(agent_plan.path.get(first)?);
+    problem(number, world, flying, seam, path)
+}
+
+/// The rest of a flight from any time on: for a plan that cannot wait for a node. Its nodes are spread anew over the straight
+/// segments of the flying plan, no closer than they were, and so keep the bound on speed; where they break another
+/// constraint the planner begins from nothing.
+#[must_use]
+pub fn rest_at(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64) -> Option<Job> {
+    let times = flying.node_times();
+    let (begin, last) = (times.first().copied()?, times.last().copied()?);
+    let interval = (last - begin) / times.len().checked_sub(1)? as f64;
+    // Casts of floats saturate; what is beyond the end has no intervals.
+    let intervals = ((last - seam) / interval) as usize;
+    let agent_plan = flying.agents.first()?;
+    let curve = Curve::of(flying, &agent_plan.name)?;
+    let interval = (last - seam) / intervals as f64;
+    let at = |node: usize| straight(&times, &agent_plan.path, seam + interval * node as f64);
+    let mut path = (0..=intervals).map(at).collect::<Option<Vec<_>>>()?;
+    *path.first_mut()? = curve.sample(seam).position;
+    problem(number, world, flying, seam, path)
+}
+
+/// What flies from the node before a time on, up to where another plan begins, and that plan; `None` where it does not
+/// begin at a node of what flies. Up to the seam the controls are those of what flies.
+#[must_use]
+pub fn joined(flying: &PlanFile, next: &PlanFile, now: f64) -> Option<PlanFile> {
+    let (old, new) = (flying.node_times(), next.node_times());
+    let seam = *new.first()?;
+    let from = old.iter().rposition(|time| *time < now).unwrap_or(0);
+    let until = old.iter().position(|time| (time - seam).abs() < 1e-6).filter(|until| *until >= from)?;
+    let times: Vec<f64> = old.iter().take(until + 1).skip(from).chain(new.iter().skip(1)).copied().collect();
+    let start_time = *times.first()?;
+    let agents = flying.agents.iter().zip(&next.agents).map(|(old, new)| AgentPlan {
+        name: new.name.clone(),
+        path: old.path.iter().take(until + 1).skip(from).chain(new.path.iter().skip(1)).cloned().collect(),
+        jam: chained(&old.jam, &new.jam, (from, until), (old.path.len(), new.path.len())),
+        azimuth: chained(&old.azimuth, &new.azimuth, (from, until), (old.path.len(), new.path.len())),
+        dropout: chained(&old.dropout, &new.dropout, (from, until), (old.path.len(), new.path.len())),
+    });
+    let duration = times.last()? - start_time;
+    let agents = agents.collect();
+    Some(PlanFile {
+        scenario: next.scenario.clone(),
+        start_time,
+        duration,
+        times: Some(times),
+        agents,
+        ..PlanFile::default()
+    })
+}
+
+/// A control of what flies at the nodes from one to another, then that of another plan behind its first node.
+fn chained(
+    old: &Option<Vec<f64>>,
+    new: &Option<Vec<f64>>,
+    (from, until): (usize, usize),
+    (old_nodes, new_nodes): (usize, usize),
+) -> Option<Vec<f64>> {
+    if old.is_none() && new.is_none() {
+        return None;
+    }
+    let whole = |values: &Option<Vec<f64>>, nodes| values.clone().unwrap_or_else(|| vec![0.0; nodes]);
+    let (old, new) = (whole(old, old_nodes), whole(new, new_nodes));
+    Some(old.into_iter().take(until + 1).skip(from).chain(new.into_iter().skip(1)).collect())
+}
+
+/// The jammer and dropout of a scenario's agent with what is left of their budgets at a time of the plan that flies.
+#[must_use]
+pub fn budgets_at(world: &ScenarioFile, flying: &PlanFile, time: f64) -> Option<Budgets> {
+    let (times, agent, plan) = (flying.node_times(), world.agents.first()?, flying.agents.first()?);
+    let jammer = agent
+        .jammer
+        .map(|jammer| Jammer { budget: left(jammer.budget, &times, plan.jam.as_deref(), time), ..jammer });
+    let dropout =
+        agent.dropout.map(|dropout| Dropout { budget: left(dropout.budget, &times, plan.dropout.as_deref(), time) });
+    Some((jammer, dropout))
+}
+
+/// Where straight segments between nodes are at a time.
+fn straight(times: &[f64], path: &[Vec<f64>], time: f64) -> Option<Vec<f64>> {
+    let after = times.iter().position(|node| *node >= time).unwrap_or(times.len().checked_sub(1)?).max(1);
+    let (from, to) = (times.get(after - 1)?, times.get(after)?);
+    let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
+    let ends = path.get(after - 1)?.iter().zip(path.get(after)?);
+    Some(ends.map(|(a, b)| a + share * (b - a)).collect())
+}
+
+/// The problem of the rest from a seam on, with the nodes of what flies until the end.
+fn problem(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64, mut path: Vec<Vec<f64>>) -> Option<Job> {
+    let times = flying.node_times();
+    let intervals = path.len().checked_sub(1).filter(|intervals| *intervals >= INTERVALS_MIN)?;
+    let duration = times.last()? - seam;
+    let interval = duration / intervals as f64;
+    let agent_plan = flying.agents.first()?;
     let mut scenario = world.clone();
     scenario.start_time = seam;
     scenario.intervals = intervals;
-    let interval = (last - seam) / intervals as f64;
-    let node_time = |node: usize| seam + interval * node as f64;
     let agent = scenario.agents.first_mut()?;
-    agent.start.clone_from(agent_plan.path.get(first)?);
-    agent.start_velocity = Some(at.velocity);
-    if let Some(jammer) = &mut agent.jammer {
-        jammer.budget = left(jammer.budget, &times, agent_plan.jam.as_deref(), seam);
-    }
-    if let Some(dropout) = &mut agent.dropout {
-        dropout.budget = left(dropout.budget, &times, agent_plan.dropout.as_deref(), seam);
-    }
-    // Nodes of unequal times are not those of a new plan: the curve between them is.
-    let sampled = || (0..=intervals).map(|node| curve.sample(node_time(node)).position).collect();
-    let nodes = || agent_plan.path.iter().skip(first).cloned().collect();
-    let mut path: Vec<Vec<f64>> = if flying.times.is_some() { sampled() } else { nodes() };
-    path.first_mut()?.clone_from(&agent.start);
+    agent.start.clone_from(path.first()?);
+    agent.start_velocity = Some(Curve::of(flying, &agent_plan.name)?.sample(seam).velocity);
     path.last_mut()?.clone_from(&agent.goal);
-    let control = |values: &Option<Vec<f64>>| {
-        values.as_ref().map(|values| {
-            let at = |node: usize| step_value(&times, values, node_time(node));
-            (0..=intervals).map(at).collect()
-        })
+    (agent.jammer, agent.dropout) = budgets_at(world, flying, seam)?;
+    let control = |values: &Option<Vec<f64>>, budget: f64| {
+        let values = values.as_ref()?;
+        Some(fit(resampled(&times, values, seam, interval, intervals), interval, budget))
     };
-    let agents = vec![AgentPlan {
-        name: agent_plan.name.clone(),
-        path,
-        jam: control(&agent_plan.jam),
-        azimuth: control(&agent_plan.azimuth),
-        dropout: control(&agent_plan.dropout),
-    }];
-    let duration = last - seam;
+    let jam = control(&agent_plan.jam, agent.jammer.map_or(0.0, |jammer| jammer.budget));
+    let dropout = control(&agent_plan.dropout, agent.dropout.map_or(0.0, |dropout| dropout.budget));
+    let azimuth = agent_plan.azimuth.as_ref().map(|values| resampled(&times, values, seam, interval, intervals));
+    let agents = vec![AgentPlan { name: agent_plan.name.clone(), path, jam, azimuth, dropout }];
     let tail =
         PlanFile { scenario: flying.scenario.clone(), start_time: seam, duration, agents, ..PlanFile::default() };
     Some(Job { number, scenario, tail, seam })
+}
+
+/// A control at the nodes of the rest.
+fn resampled(times: &[f64], values: &[f64], seam: f64, interval: f64, intervals: usize) -> Vec<f64> {
+    (0..=intervals).map(|node| step_value(times, values, seam + interval * node as f64)).collect()
+}
+
+/// A control lowered to its budget, which nodes at other times may exceed.
+fn fit(control: Vec<f64>, interval: f64, budget: f64) -> Vec<f64> {
+    let spent = interval * control.iter().skip(1).sum::<f64>();
+    // Rounding is not worth a change.
+    let share = if spent > budget * (1.0 + EVEN_TOLERANCE) { budget / spent } else { 1.0 };
+    control.into_iter().map(|value| value * share).collect()
 }
 
 /// The value of a control at a time: that of the node at the end of the interval, as the integrals count it.

@@ -23,11 +23,16 @@ use crate::frame::{Altitude, Place};
 use crate::link::dialect::{HEARTBEAT_DATA, MavAutopilot, MavLandedState, MavMessage, MavModeFlag, MavType};
 use crate::link::{Frame, Identity};
 
-/// Messages to ask for, and how often, Hz: GLOBAL_POSITION_INT, MISSION_CURRENT, EXTENDED_SYS_STATE.
-pub const INTERVALS: [(u32, f32); 3] = [(33, 10.0), (42, 2.0), (245, 2.0)];
+/// Messages to ask for, and how often, Hz: GLOBAL_POSITION_INT, MISSION_CURRENT, EXTENDED_SYS_STATE. Payloads are switched
+/// where the mission is, so where it is must be known to a tenth of a second.
+pub const INTERVALS: [(u32, f32); 3] = [(33, 10.0), (42, 20.0), (245, 2.0)];
 
 /// Silence after which the link to the autopilot counts as lost.
 pub const LINK_TIMEOUT: Duration = Duration::from_secs(3);
+
+/// Time without a heartbeat after which it counts as lost too: mode and arming are known by heartbeats alone. A link that
+/// loses every tenth frame loses three of them in a row every quarter of an hour.
+pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_secs(6);
 
 /// Where the vehicle is, and how it moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,8 +74,10 @@ pub struct Vehicle {
     pub armed: bool,
     /// Its mode.
     pub mode: Mode,
-    /// When its last heartbeat came.
+    /// When it was heard last, whatever it said.
     pub heard: Time,
+    /// When its last heartbeat came.
+    pub heartbeat: Time,
     /// Whether it flies.
     pub flying: Flying,
     /// Where it is.
@@ -113,7 +120,9 @@ impl Telemetry {
     /// Whether the vehicle has been heard, and has fallen silent.
     #[must_use]
     pub fn is_lost(&self, now: Time) -> bool {
-        self.vehicle.is_some_and(|vehicle| now.since(vehicle.heard) > LINK_TIMEOUT)
+        self.vehicle.is_some_and(|vehicle| {
+            now.since(vehicle.heard) > LINK_TIMEOUT || now.since(vehicle.heartbeat) > HEARTBEAT_TIMEOUT
+        })
     }
 
     /// Takes a message of the link. True where it comes from the vehicle.
@@ -124,6 +133,7 @@ impl Telemetry {
         let Some(vehicle) = self.vehicle.as_mut().filter(|vehicle| vehicle.identity == frame.from) else {
             return false;
         };
+        vehicle.heard = now;
         match &frame.message {
             MavMessage::GLOBAL_POSITION_INT(data) => {
                 let place = Place {
@@ -175,6 +185,7 @@ impl Telemetry {
             armed: data.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
             mode: Mode::of(autopilot, airframe, data.custom_mode),
             heard: now,
+            heartbeat: now,
             flying: before.map(|vehicle| vehicle.flying).unwrap_or_default(),
             fix: before.and_then(|vehicle| vehicle.fix),
             current: before.and_then(|vehicle| vehicle.current),
@@ -211,6 +222,12 @@ mod tests {
         assert_eq!((vehicle.identity, vehicle.mode), (Identity { system: 3, component: 1 }, Mode::Guided));
         assert!(!vehicle.armed);
         assert!(!telemetry.is_lost(now(3010)) && telemetry.is_lost(now(3011)));
+        let ours = MavMessage::GLOBAL_POSITION_INT(Default::default());
+        let mut heard = telemetry.clone();
+        heard.handle(now(2000), &frame(3, 1, ours.clone()));
+        assert!(!heard.is_lost(now(5000)) && heard.is_lost(now(5001)));
+        heard.handle(now(5000), &frame(3, 1, ours));
+        assert!(!heard.is_lost(now(6010)) && heard.is_lost(now(6011)), "no heartbeat");
         assert!(!telemetry.handle(now(30), &frame(4, 1, MavMessage::GLOBAL_POSITION_INT(Default::default()))));
         assert_eq!(telemetry.vehicle().expect("heard").fix, None);
     }

@@ -13,6 +13,9 @@
 //! - Steps drop the nodes that were flown and keep the interval, so that the tail is a plan of the rest as it stands. It
 //!   is where a step starts from, and what stays in force if the step finds nothing better: a flight is feasible from
 //!   beginning to end wherever its first plan is and the world does not close the way.
+//! - The tail is as good a start as its world has not changed. So a step refines it after a few projected-gradient
+//!   iterations, [`NEAR_ITERATIONS`], which costs a small part of the first step; where that finds no feasible plan, it takes
+//!   as many as the settings allow, and then searches everywhere.
 //! - Each step may choose another flight time, and so another interval. At the seam, the change of velocity counts over
 //!   the mean of the intervals on both sides: |v_1 - v_0| <= a (h_0 + h) / 2, as everywhere in the path that was flown.
 //! - Budgets are those of the whole flight; what was flown is taken off them.
@@ -46,6 +49,9 @@ use crate::trajectory::Trajectory;
 
 use outlook::Outlook;
 
+/// Projected-gradient iterations of a step before its plan is refined: it has to bring the tail clear of what came too near,
+/// and the refinement does the rest.
+pub const NEAR_ITERATIONS: usize = 4;
 /// Part of a budget below which what is left of it counts as nothing, or as many rounding units if they are more.
 const NOTHING_LEFT: f64 = 1e-9;
 const ROUNDING_UNITS: f64 = 64.0;
@@ -198,14 +204,12 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Horizon
         let mut outcome = nothing_done(&now, need);
         let mut choice = Choice::Tail;
         let is_fixed = self.is_planned && (need.is_some() || self.tail.intervals() < 2 || is_overdue(&rest));
-        for is_global in [false, true] {
-            let is_wanted =
-                if is_global { !self.is_planned || search == Search::Anew || !now.feasible } else { self.is_planned };
-            if is_fixed || !is_wanted {
+        for reach in Reach::ALL {
+            if is_fixed || !self.is_wanted(reach, search, &now, &outcome) {
                 continue;
             }
-            let start = if is_global { Start::Global } else { Start::Given(&self.tail) };
-            match solver::plan(&rest, settings, start, workspace, deadline) {
+            let start = if reach == Reach::Everywhere { Start::Global } else { Start::Given(&self.tail) };
+            match solver::plan(&rest, &reach.settings(settings), start, workspace, deadline) {
                 Ok(done) => {
                     add(&mut outcome, &done);
                     let (best, scratch) = workspace.parts();
@@ -228,6 +232,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Horizon
         }
         self.outlook.take(&rest, &self.tail, workspace.parts().1);
         Ok(Step { time: rest.frame.start_time, choice, feasible: now.feasible, change, outcome })
+    }
+
+    /// Whether a step has to look so far, after what it has found and done so far.
+    fn is_wanted(&self, reach: Reach, search: Search, now: &Worth<T>, done: &Outcome<T, DIM>) -> bool {
+        match reach {
+            Reach::Near => self.is_planned,
+            // Nothing feasible there, or what cannot be refined and was not finished.
+            Reach::Around => {
+                let is_unfinished = done.refinements == 0 && done.status == Status::IterationLimit;
+                self.is_planned && (!now.feasible || is_unfinished)
+            }
+            Reach::Everywhere => !self.is_planned || search == Search::Anew || !now.feasible,
+        }
     }
 
     /// Flies the next `intervals` of the plan in force, or those that are left; returns how many.
@@ -363,6 +380,26 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Horizon
         frame.start_time = self.tail.start_time();
         frame.start_interval = self.interval;
         View { frame, agents, ..*seen }
+    }
+}
+
+/// How far a step looks for a plan, in the order of trying.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reach {
+    /// From the tail, with few iterations.
+    Near,
+    /// From the tail, with as many as it takes.
+    Around,
+    /// From everywhere.
+    Everywhere,
+}
+
+impl Reach {
+    const ALL: [Self; 3] = [Self::Near, Self::Around, Self::Everywhere];
+
+    fn settings<T: Real>(self, given: &Settings<T>) -> Settings<T> {
+        let iterations = if self == Self::Near { given.iterations.min(NEAR_ITERATIONS) } else { given.iterations };
+        Settings { iterations, ..*given }
     }
 }
 

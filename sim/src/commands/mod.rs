@@ -1,10 +1,12 @@
 //! What each command does.
 
+pub mod autopilot;
 pub mod check;
 pub mod completions;
 pub mod landscape;
 pub mod new;
 pub mod plan;
+pub mod steps;
 pub mod trade;
 
 use quietpath_bridge::file::ScenarioFile;
@@ -24,6 +26,7 @@ pub fn run(cli: Cli) -> Result<Verdict, Failure> {
         Some(Command::Landscape(args)) => landscape::run(&args),
         Some(Command::Check(args)) => check::run(&args),
         Some(Command::New(args)) => new::run(&args),
+        Some(Command::Autopilot(args)) => autopilot::run(&args),
         Some(Command::Completions(args)) => completions::run(&args),
     }
 }

@@ -8,17 +8,20 @@
 //! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
 //! | `path.geojson` | for maps; with latitude and longitude only |
 //!
+//! A scenario with `[rolling]` is planned in steps; all files above are then those of the plan that was flown, and beside
+//! them stands what [`super::steps`] writes. With `--once` it is planned in one piece.
+//!
 //! A plan that is not feasible is drawn and written for people to look at, but not as a mission or map.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use quietpath_bridge::file::mission::{file_name, missions};
-use quietpath_bridge::file::{ScenarioFile, geojson};
-use quietpath_bridge::planning::{self, Options, Planned, Precision, Rollout};
+use quietpath_bridge::file::{PlanFile, ScenarioFile, geojson};
+use quietpath_bridge::planning::{self, Assessment, Obstacle, Options, Planned, Precision, Rollout, Step};
 use quietpath_core::scenario::Metric;
 
-use super::{landscape, load};
+use super::{landscape, load, steps};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
@@ -34,7 +37,7 @@ const CELLS: usize = 240;
 /// Plans a scenario file.
 ///
 /// # Errors
-/// Bad input, a scenario that this version does not plan, files that cannot be written.
+/// Bad input, files that cannot be written.
 pub fn run(args: &PlanArgs) -> Result<Verdict, Failure> {
     let scenario = load(&args.scenario)?;
     carry_out(&scenario, args)
@@ -65,26 +68,45 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
             .map_err(|cause| Failure::Input(format!("cannot make the folder {}: {cause}", folder.display())))?;
     }
     let metric = background(scenario, args.metric)?;
-    let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
-    let Planned { plan, assessment, obstacle, .. } = planned;
+    let made = make(scenario, args)?;
     let json_to_stdout = args.plan.as_deref() == Some(Path::new("-"));
     let summary_to = if json_to_stdout { Stream::Err } else { Stream::Out };
     match &args.plan {
-        Some(_) if json_to_stdout => say(Stream::Out, &plan.to_json())?,
-        Some(file) => write_file(file, plan.to_json().as_bytes())?,
+        Some(_) if json_to_stdout => say(Stream::Out, &made.plan.to_json())?,
+        Some(file) => write_file(file, made.plan.to_json().as_bytes())?,
         None => {}
     }
-    let mut text = report::summary(scenario, &plan, &assessment);
-    if let Some(obstacle) = &obstacle {
+    let mut text = report::summary(scenario, &made.plan, &made.assessment);
+    text.push_str(&report::steps(&made.steps));
+    if let Some(obstacle) = &made.obstacle {
         text.push_str(&report::obstacle(scenario, obstacle));
     }
     if let Some(folder) = &args.out {
-        let flown = Flown { plan: &plan, assessment: &assessment };
-        let written = with_progress("drawing", || write_folder(scenario, flown, metric, folder))?;
+        let written = with_progress("drawing", || write_folder(scenario, &made, metric, folder))?;
         text.push_str(&list(folder, &written));
     }
     say(summary_to, &text)?;
-    Ok(Verdict::on(assessment.feasible))
+    Ok(Verdict::on(made.assessment.feasible))
+}
+
+/// A plan, made in one piece or in steps.
+struct Made {
+    plan: PlanFile,
+    assessment: Assessment,
+    obstacle: Option<Obstacle>,
+    /// None where it was made in one piece.
+    steps: Vec<Step>,
+}
+
+fn make(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Made, Failure> {
+    if scenario.rolling.is_some() && !args.once {
+        let rolled = steps::roll(scenario, &options(args))?;
+        let obstacle = rolled.obstacle().cloned();
+        return Ok(Made { plan: rolled.plan, assessment: rolled.assessment, obstacle, steps: rolled.steps });
+    }
+    let planned = with_progress("planning", || planning::plan(scenario, &options(args)))?;
+    let Planned { plan, assessment, obstacle, .. } = planned;
+    Ok(Made { plan, assessment, obstacle, steps: Vec::new() })
 }
 
 fn options(args: &PlanArgs) -> Options {
@@ -117,12 +139,8 @@ struct Written {
     skipped: Option<String>,
 }
 
-fn write_folder(
-    scenario: &ScenarioFile,
-    flown: Flown<'_>,
-    metric: Metric,
-    folder: &Path,
-) -> Result<Written, Failure> {
+fn write_folder(scenario: &ScenarioFile, made: &Made, metric: Metric, folder: &Path) -> Result<Written, Failure> {
+    let flown = Flown { plan: &made.plan, assessment: &made.assessment, steps: &made.steps };
     let mut files = Vec::new();
     let mut put = |name: String, bytes: &[u8]| -> Result<(), Failure> {
         write_file(&folder.join(&name), bytes)?;
@@ -156,6 +174,9 @@ fn write_folder(
             }
             Err(cause) => skipped = Some(format!("no mission files: {cause}")),
         }
+    }
+    if !made.steps.is_empty() {
+        files.extend(steps::write(scenario, flown, metric, folder)?);
     }
     Ok(Written { files, skipped })
 }

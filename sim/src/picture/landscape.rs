@@ -6,7 +6,7 @@
 //! | sensor | white dot with its name; a moving one at the picture's instant, its track dashed |
 //! | region | what is forbidden hatched: the region, or all around one to stay in |
 //! | flight | coloured line with arrowheads, ring at the start, square at the goal |
-//! | jamming | pale band along the flight, as wide as the level is high |
+//! | jamming | pale band along the flight, as wide as the level is high; rays where a beam points |
 //! | dropout | wider line with a white core where the transmitter is at least half silent |
 //!
 //! Both axes have the same scale.
@@ -28,6 +28,10 @@ const SIDE_MIN: f64 = 90.0;
 const BAR: f64 = 20.0;
 /// Jamming levels and dropouts below this are not drawn.
 const FAINTEST: f64 = 0.02;
+/// Length of the rays that tell where a beam points.
+const RAY: f64 = 34.0;
+/// Least distance of two rays along a flight.
+const RAYS_APART: f64 = 26.0;
 /// Opacity of the bands that tell of jamming.
 const JAM_OPACITY: f64 = 0.55;
 /// Usual width of a flight's line.
@@ -72,12 +76,29 @@ pub struct Flight {
     pub dash: &'static str,
     /// Width of the line; [`LINE`] is the usual.
     pub width: f64,
+    /// Which of its ends are marked.
+    pub ends: Ends,
     /// Its nodes.
     pub points: Vec<[f64; 2]>,
     /// Jamming level at each node, 0 to 1; may be empty.
     pub jam: Vec<f64>,
+    /// Direction of a beam at each node, rad counter-clockwise from east; empty where jamming has no direction.
+    pub azimuth: Vec<f64>,
     /// Dropout at each node, 0 to 1; may be empty.
     pub dropout: Vec<f64>,
+}
+
+/// Which ends of a flight are marked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// Start and goal.
+    Both,
+    /// The start alone: the flight goes on.
+    Start,
+    /// The goal alone: the flight has begun before.
+    Goal,
+    /// None, and no arrowheads either: one of many.
+    Neither,
 }
 
 /// What the landscape shows; all positions in the unit that the axes name.
@@ -214,12 +235,17 @@ fn flights(canvas: &mut Canvas, map: &Map, flights: &[Flight]) {
         canvas.polyline(&points, Stroke::solid(&flight.colour, flight.width).dashed(flight.dash));
         silence(canvas, &points, flight);
     }
-    let arrows_max = if flights.len() > CROWD { ARROWS_IN_CROWD } else { ARROWS };
     for flight in flights {
+        rays(canvas, &map.all(&flight.points), flight);
+    }
+    let arrows_max = if flights.len() > CROWD { ARROWS_IN_CROWD } else { ARROWS };
+    for flight in flights.iter().filter(|flight| flight.ends != Ends::Neither) {
         let points = map.all(&flight.points);
         arrows(canvas, &points, &flight.colour, arrows_max);
-        if let (Some(start), Some(goal)) = (points.first(), points.last()) {
+        if let (Some(start), Ends::Both | Ends::Start) = (points.first(), flight.ends) {
             start_mark(canvas, *start, &flight.colour);
+        }
+        if let (Some(goal), Ends::Both | Ends::Goal) = (points.last(), flight.ends) {
             goal_mark(canvas, *goal, &flight.colour);
         }
     }
@@ -232,6 +258,27 @@ fn controls(canvas: &mut Canvas, points: &[[f64; 2]], jam: &[f64], loudest: f64)
             canvas.polyline(ends, Stroke::solid("#fff3a6", 6.0 + 14.0 * level / loudest));
         }
     }
+}
+
+/// Rays from the flight to where its beam points, as far apart as can be told from each other.
+fn rays(canvas: &mut Canvas, points: &[[f64; 2]], flight: &Flight) {
+    let mut since = RAYS_APART;
+    let nodes = points.windows(2).zip(flight.azimuth.iter().zip(&flight.jam).skip(1));
+    for (ends, (azimuth, level)) in nodes {
+        since += length(ends);
+        if let ([_, at], true) = (ends, *level > FAINTEST && since >= RAYS_APART) {
+            ray(canvas, *at, *azimuth);
+            since = 0.0;
+        }
+    }
+}
+
+fn ray(canvas: &mut Canvas, [x, y]: [f64; 2], azimuth: f64) {
+    let along = [RAY * azimuth.cos(), -RAY * azimuth.sin()];
+    let tip = [x + along[0], y + along[1]];
+    canvas.line([x, y], tip, Stroke::solid("#222222", 3.6).opacity(0.6));
+    canvas.line([x, y], tip, Stroke::solid("#fff3a6", 1.8));
+    marks::arrowhead(canvas, tip, along, 5.5, "#222222");
 }
 
 /// The highest value of a control in any flight; node 0 has no interval, so its value means nothing.
@@ -345,12 +392,14 @@ fn entries(scene: &Scene) -> Vec<Entry> {
         entries.push(Entry { sample, words: words.to_owned() });
     };
     for flight in scene.flights.iter().filter(|flight| !flight.name.is_empty()) {
-        let (colour, dash) = (flight.colour.clone(), flight.dash);
+        let (colour, dash, has_arrows) = (flight.colour.clone(), flight.dash, flight.ends != Ends::Neither);
         add(
             &flight.name,
             Box::new(move |canvas, [x, y]| {
                 canvas.line([x, y], [x + SAMPLE, y], Stroke::solid(&colour, LINE).dashed(dash));
-                marks::arrowhead(canvas, [x + 0.5 * SAMPLE, y], [1.0, 0.0], 10.5, &colour);
+                if has_arrows {
+                    marks::arrowhead(canvas, [x + 0.5 * SAMPLE, y], [1.0, 0.0], 10.5, &colour);
+                }
             }),
         );
     }
@@ -385,6 +434,9 @@ fn entries(scene: &Scene) -> Vec<Entry> {
             &format!("jamming (width: level, up to {})", trimmed((level * 100.0).round() / 100.0)),
             Box::new(jam_sample),
         );
+    }
+    if level > FAINTEST && scene.flights.iter().any(|flight| !flight.azimuth.is_empty()) {
+        add("where the beam points", Box::new(|canvas, [x, y]| ray(canvas, [x - 6.0, y], 0.0)));
     }
     if highest(&scene.flights, |flight| &flight.dropout) >= 0.5 {
         add("dropout (transmitter silent)", Box::new(dropout_sample));

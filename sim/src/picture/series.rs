@@ -1,7 +1,7 @@
 //! The series: every figure along the flight against its limits, over time.
 //!
 //! One small diagram a figure, two side by side, all with the same time axis. Agents keep the colours of the
-//! landscape; limits are dashed. A positive figure that spans decades is drawn logarithmically.
+//! landscape; limits are dashed, and faint lines mark where steps begin. A positive figure that spans decades is drawn logarithmically.
 
 use super::Picture;
 use super::canvas::{Align, Area, Canvas, FAINT, INK, Stroke, Type};
@@ -62,6 +62,8 @@ pub struct Sheet {
     pub time: [f64; 2],
     /// Names of the agents.
     pub agents: Vec<String>,
+    /// Times at which steps begin, but the first.
+    pub steps: Vec<f64>,
     /// The diagrams, row by row.
     pub panels: Vec<Panel>,
 }
@@ -72,14 +74,13 @@ pub fn draw(sheet: &Sheet) -> Picture {
     let mut canvas = Canvas::new();
     marks::heading(&mut canvas, [LEFT - 48.0, 34.0], &sheet.title, &sheet.subtitle);
     let legend = marks::legend(&mut canvas, [LEFT - 48.0, 66.0], WIDTH - 60.0, &entries(sheet));
-    let time = Scale::linear(sheet.time[0], sheet.time[1].max(sheet.time[0] + 1e-9));
     let top = 66.0 + legend + 34.0;
     let mut bottom = top;
     for (index, panel) in sheet.panels.iter().enumerate() {
         let (column, row) = ((index % 2) as f64, (index / 2) as f64);
         let area = Area { left: LEFT + column * COLUMN, top: top + row * ROW, width: PANEL[0], height: PANEL[1] };
         let lowest = index + 2 >= sheet.panels.len();
-        draw_panel(&mut canvas, area, panel, &time, if lowest { Numbers::Shown } else { Numbers::Hidden });
+        draw_panel(&mut canvas, area, panel, sheet, if lowest { Numbers::Shown } else { Numbers::Hidden });
         if lowest {
             let label = format!("time ({})", sheet.time_unit);
             let at = [area.left + 0.5 * area.width, area.bottom() + 44.0];
@@ -100,14 +101,24 @@ fn entries(sheet: &Sheet) -> Vec<Entry> {
     }
     let sample = |canvas: &mut Canvas, [x, y]: [f64; 2]| canvas.line([x, y], [x + SAMPLE, y], limit_stroke());
     entries.push(Entry { sample: Box::new(sample), words: "limit".into() });
+    if !sheet.steps.is_empty() {
+        let sample = |canvas: &mut Canvas, [x, y]: [f64; 2]| {
+            let middle = x + 0.5 * SAMPLE;
+            canvas.line([middle, y - 9.0], [middle, y + 9.0], STEP_STROKE);
+        };
+        entries.push(Entry { sample: Box::new(sample), words: "a step begins".into() });
+    }
     entries
 }
+
+const STEP_STROKE: Stroke<'static> = Stroke::solid("#b08fc7", 1.2).dashed("2 3");
 
 const fn limit_stroke() -> Stroke<'static> {
     Stroke::solid("#444444", 1.4).dashed("7 4")
 }
 
-fn draw_panel(canvas: &mut Canvas, area: Area, panel: &Panel, time: &Scale, numbers: Numbers) {
+fn draw_panel(canvas: &mut Canvas, area: Area, panel: &Panel, sheet: &Sheet, numbers: Numbers) {
+    let time = &Scale::linear(sheet.time[0], sheet.time[1].max(sheet.time[0] + 1e-9));
     let unit = if panel.unit.is_empty() { String::new() } else { format!(" ({})", panel.unit) };
     let title = format!("{}{unit}", panel.title);
     canvas.text([area.left, area.top - 9.0], &title, Type::plain(LABEL_TEXT, Align::Start).bold());
@@ -119,6 +130,10 @@ fn draw_panel(canvas: &mut Canvas, area: Area, panel: &Panel, time: &Scale, numb
         canvas.text([area.right(), area.top - 9.0], &words, Type::plain(13.0, Align::End).colour(FAINT));
     }
     marks::grid_lines(canvas, area, (time, 6), (&scale, 4));
+    for step in &sheet.steps {
+        let x = area.left + time.share(*step) * area.width;
+        canvas.line([x, area.top], [x, area.bottom()], STEP_STROKE);
+    }
     let at = |[x, y]: [f64; 2]| {
         [area.left + time.share(x) * area.width, area.bottom() - scale.share(y).clamp(-0.02, 1.02) * area.height]
     };

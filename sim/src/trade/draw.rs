@@ -137,13 +137,12 @@ fn paths(swept: &Swept, field: &planning::Grid) -> Result<Picture, DrawError> {
     let Some(scenario) = swept.points.first().map(|point| &point.case.scenario) else {
         return Err(DrawError::nothing());
     };
-    let scale = illustrate::map_unit(scenario).1;
     let mut flights = Vec::new();
     let count = swept.points.len();
     for (number, (point, ink)) in swept.points.iter().zip(inks(swept)).enumerate() {
         for (index, agent) in point.planned.plan.agents.iter().enumerate() {
             let name = if index == 0 { point.case.label(swept.over) } else { String::new() };
-            let mut flight = illustrate::flight(agent, scale, &name, &ink);
+            let mut flight = illustrate::flight(scenario, agent, &name, &ink);
             // Earlier lines are wider, so that they show below later ones on the same way.
             flight.width += (WIDENING_MAX / count as f64).min(3.0) * (count - 1 - number) as f64;
             if index > 0 {

@@ -115,6 +115,9 @@ pub struct RunArgs {
     /// Allow jamming, where the scenario allows it too. Radiating interference needs lawful authority
     #[arg(long, action = ArgAction::SetTrue)]
     pub arm_jammer: bool,
+    /// How many times faster than time to fly, against a simulated autopilot with the same speed
+    #[arg(long, value_name = "N", default_value_t = 1.0)]
+    pub speedup: f64,
 }
 
 #[derive(Args)]

@@ -24,7 +24,7 @@ use crate::config::Config;
 use crate::observe::Observations;
 
 /// Longest that the loop waits for a frame.
-const TICK: Duration = Duration::from_millis(10);
+const TICK: Duration = Duration::from_millis(4);
 /// Time between two status lines.
 const STATUS: Duration = Duration::from_secs(1);
 /// Time between two lines of the log that say the same as the status line, where nobody watches.
@@ -84,7 +84,9 @@ impl Loop {
         let settings = config.flight.clone();
         let flight =
             Flight::new(&scenario, &plan, settings.clone()).map_err(|error| Outcome::Input(error.to_string()))?;
-        let clock = SystemClock::start();
+        let clock = SystemClock::at_speed(args.speedup).ok_or_else(|| {
+            Outcome::Input("--speedup is how many times faster than time to fly: a number above 0".into())
+        })?;
         let observations = Observations::open(config.observations.as_deref()).map_err(Outcome::Input)?;
         let recorder = match &config.record {
             None => None,
@@ -99,7 +101,7 @@ impl Loop {
             Some(replan) => {
                 let deadline = Duration::try_from_secs_f64(replan.deadline_s)
                     .map_err(|_| Outcome::Input("flight.replan.deadline_s must be a time in seconds".into()))?;
-                Some(Worker::start(deadline).map_err(fault)?)
+                Some(Worker::start(clock.real(deadline)).map_err(fault)?)
             }
         };
         let stop = Arc::new(AtomicBool::new(false));

@@ -26,7 +26,9 @@
 //! | `[[objective.term]]` `metric` and its kin | | `metric` must be given |
 //! | `[[region]]` `center` and `radius`, or `polygon` | length | one of them |
 //! | `[[region]]` `name`, `inside`, `from`, `until` | , , s, s | `region1` .., false: keep out, always |
-//! | `[[limit]]`, `[rolling]` | | none |
+//! | `[[limit]]` | | none |
+//! | `[rolling]` `steps`, or `adaptive` `shortest`, `longest`, `change` | | in one piece; one of them |
+//! | `[rolling]` `reveal` | `current`, `predicted`, `known` | `current` |
 //!
 //! A polygon is a list of 3 to [`quietpath_core::scenario::VERTICES_MAX`] corners in order, in either direction, and
 //! strictly convex. Limits: [`crate::capacity`].
@@ -39,6 +41,7 @@ mod tests;
 
 pub(crate) use convert::point;
 
+use quietpath_core::horizon::{Cadence, Reveal};
 use quietpath_core::scenario::{
     Detection, Dropout, Jammer, Limit, Pooling, Ranging, ReferencePoint, Side, Susceptibility, Term, Timing, Window,
 };
@@ -184,19 +187,12 @@ pub struct RegionEntry {
     pub window: Window<f64>,
 }
 
-/// How much of the world a plan in steps knows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reveal {
-    /// Sensors are taken to stay where they are at the time of the step.
-    Current,
-}
-
 /// A plan made in steps while flying.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rolling {
-    /// Number of steps.
-    pub steps: usize,
-    /// How much of the world each step knows.
+    /// How much of each plan is flown.
+    pub cadence: Cadence<f64>,
+    /// What each step knows of moving sensors.
     pub reveal: Reveal,
 }
 

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use quietpath_core::Metric;
+use quietpath_core::horizon::{Cadence, Reveal};
 use quietpath_core::scenario::{
     AgentSet, BeamPattern, Betrayal, Detection, Dropout, Jammer, Limit, Pooling, Ranging, Reduce, ReferencePoint,
     Sense, Side, Susceptibility, Term, Timing, Window,
 };
 
 use super::{
-    AgentEntry, Bounds, FrameSpec, KnotEntry, Loaded, MotionEntry, Origin, Outline, RegionEntry, Reveal, Rolling,
+    AgentEntry, Bounds, FrameSpec, KnotEntry, Loaded, MotionEntry, Origin, Outline, RegionEntry, Rolling,
     ScenarioFile, SensorEntry,
 };
 use crate::capacity;
@@ -74,6 +75,7 @@ fn scenario(source: &Source) -> Outcome<ScenarioFile> {
     let dimension = dimension(&top)?;
     let points = [("current", ReferencePoint::Current), ("lagged", ReferencePoint::Lagged)];
     let agents = agents(&top, dimension)?;
+    let intervals = intervals(&top)?;
     Ok(ScenarioFile {
         source: source.clone(),
         name: top.text_optional("name")?.or(stem).unwrap_or_default(),
@@ -84,7 +86,7 @@ fn scenario(source: &Source) -> Outcome<ScenarioFile> {
         start_time: top.number_or("start_time", 0.0)?,
         separation: positive_optional(&top, "separation")?,
         frame: frame(&top)?,
-        intervals: intervals(&top)?,
+        intervals,
         time: timing(&top)?,
         domain: domain(&top, dimension)?,
         sensors: sensors(&top, dimension)?,
@@ -92,7 +94,7 @@ fn scenario(source: &Source) -> Outcome<ScenarioFile> {
         agents,
         regions: regions(&top)?,
         limits: limits(&top)?,
-        rolling: rolling(&top)?,
+        rolling: rolling(&top, intervals)?,
     })
 }
 
@@ -429,13 +431,49 @@ fn limits(top: &Table<'_>) -> Outcome<Vec<Limit<f64>>> {
     top.tables("limit", &["metric", "min", "max"])?.into_iter().map(read).collect()
 }
 
-fn rolling(top: &Table<'_>) -> Outcome<Option<Rolling>> {
-    let Some(table) = top.table("rolling", &["steps", "reveal"])? else { return Ok(None) };
-    let steps = table.required("steps", "18")?;
-    let count = steps.count()?;
-    if count == 0 {
-        return Err(steps.error("must be greater than 0, not 0", "give the number of steps, such as 18"));
+fn rolling(top: &Table<'_>, intervals: usize) -> Outcome<Option<Rolling>> {
+    let Some(table) = top.table("rolling", &["steps", "adaptive", "reveal"])? else { return Ok(None) };
+    let known = [("current", Reveal::Current), ("predicted", Reveal::Predicted), ("known", Reveal::Known)];
+    let reveal = table.choice("reveal", &known, Some(Reveal::Current))?;
+    let adaptive = table.table("adaptive", &["shortest", "longest", "change"])?;
+    let cadence = match (table.optional("steps"), adaptive) {
+        (Some(steps), None) => Cadence::Even { steps: within(&steps, [1, intervals], "such as 18")? },
+        (None, Some(lengths)) => adaptive_steps(&lengths, intervals)?,
+        (Some(_), Some(_)) => {
+            let help =
+                "keep `steps` for steps of equal length, `adaptive` for steps that follow the change that is seen";
+            return Err(table.error("adaptive", "must not stand beside `steps`", help));
+        }
+        (None, None) => {
+            let help = "add `steps = 18`, or `adaptive = { shortest = 1, longest = 10, change = 0.05 }`";
+            return Err(table.error("steps", "is missing", help));
+        }
+    };
+    Ok(Some(Rolling { cadence, reveal }))
+}
+
+fn adaptive_steps(lengths: &Table<'_>, intervals: usize) -> Outcome<Cadence<f64>> {
+    let shortest = within(&lengths.required("shortest", "1")?, [1, intervals], "the intervals of the shortest step")?;
+    let longest =
+        within(&lengths.required("longest", "10")?, [shortest, intervals], "the intervals of the longest step")?;
+    let change = lengths.required("change", "0.05")?;
+    match change.number()? {
+        much if much > 0.0 => Ok(Cadence::Adaptive { shortest, longest, change: much }),
+        little => {
+            let help = "give the mean change of the metric along the plan, as a part of its span, from which on steps shorten";
+            Err(change.error(format!("must be greater than 0, not {little}"), help))
+        }
     }
-    let reveal = table.choice("reveal", &[("current", Reveal::Current)], Some(Reveal::Current))?;
-    Ok(Some(Rolling { steps: count, reveal }))
+}
+
+/// A whole number between two bounds.
+fn within(value: &Value<'_>, [least, most]: [usize; 2], what: &str) -> Outcome<usize> {
+    match value.count()? {
+        0 => Err(value.error("must be greater than 0, not 0", format!("give a whole number, {what}"))),
+        count if (least..=most).contains(&count) => Ok(count),
+        count => {
+            let help = format!("give a whole number, {what}; the flight has {most} intervals");
+            Err(value.error(format!("must lie between {least} and {most}, but is {count}"), help))
+        }
+    }
 }

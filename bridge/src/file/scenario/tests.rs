@@ -242,6 +242,44 @@ const CASES: &[Case] = &[
     ),
     ("[[objective", "[rolling]\nsteps = 0\n[[objective", &["small.toml:28: rolling.steps must be greater than 0"]),
     (
+        "[[objective",
+        "[rolling]\nsteps = 61\n[[objective",
+        &[
+            "small.toml:28: rolling.steps must lie between 1 and 60, but is 61\n  28 | steps = 61",
+            "the flight has 60 intervals",
+        ],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nreveal = \"known\"\n[[objective",
+        &["small.toml:27: rolling.steps is missing", "help: add `steps = 18`, or `adaptive = {"],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nsteps = 6\nreveal = \"all\"\n[[objective",
+        &["small.toml:29: rolling.reveal must not be `all`", "it can be `current`, `predicted`"],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nsteps = 6\nadaptive = { shortest = 1, longest = 9, change = 0.1 }\n[[objective",
+        &["small.toml:29: rolling.adaptive must not stand beside `steps`"],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nadaptive = { shortest = 4, longest = 2, change = 0.1 }\n[[objective",
+        &["small.toml:28: rolling.adaptive.longest must lie between 4 and 60, but is 2"],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nadaptive = { shortest = 4, change = 0.1 }\n[[objective",
+        &["small.toml:28: rolling.adaptive.longest is missing", "add `longest = 10`"],
+    ),
+    (
+        "[[objective",
+        "[rolling]\nadaptive = { shortest = 1, longest = 9, change = 0 }\n[[objective",
+        &["small.toml:28: rolling.adaptive.change must be greater than 0, not 0"],
+    ),
+    (
         "[[sensor]]\nposition = [2.0",
         "[[agent]]\nname = \"uav1\"\nstart = [1, 1]\ngoal = [2, 2]\nspeed_max = 1\naccel_max = 1\n[[sensor]]\nposition = [2.0",
         &["small.toml:18: agent[1].name is `uav1`, the name of agent[0] already"],
@@ -413,7 +451,7 @@ fn the_published_scenarios_are_read_whole() {
     assert_eq!(count, 26);
     let read = |name: &str| ScenarioFile::read(&format!("{folder}/{name}.toml")).expect(name).scenario;
     let wight = read("wight-jam");
-    assert_eq!(wight.rolling, Some(Rolling { steps: 18, reveal: Reveal::Current }));
+    assert_eq!(wight.rolling, Some(Rolling { cadence: Cadence::Even { steps: 18 }, reveal: Reveal::Current }));
     assert_eq!(wight.agents[0].jammer.map(|jammer| jammer.budget), Some(1500.0));
     assert!(matches!(wight.regions[1].outline, Outline::Circle { center: [7.0, 1.9], .. }));
     assert_eq!(wight.frame.unit_m, 1000.0);
@@ -421,6 +459,16 @@ fn the_published_scenarios_are_read_whole() {
     assert_eq!(wight.sensors.iter().filter(moving).count(), 1);
     assert_eq!(read("square8-mixed").terms[0].window, Window { from: f64::NEG_INFINITY, until: 55.0 });
     assert_eq!(read("volume8-detection").dimension, 3);
+}
+
+#[test]
+fn steps_may_follow_the_change_that_is_seen() {
+    let lengths =
+        "[rolling]\nreveal = \"predicted\"\nadaptive = { shortest = 2, longest = 9, change = 0.1 }\n[[objective";
+    let text = GOOD.replacen("[[objective", lengths, 1);
+    let scenario = ScenarioFile::parse("steps.toml", &text).expect("legal").scenario;
+    let cadence = Cadence::Adaptive { shortest: 2, longest: 9, change: 0.1 };
+    assert_eq!(scenario.rolling, Some(Rolling { cadence, reveal: Reveal::Predicted }));
 }
 
 #[test]

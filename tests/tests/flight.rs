@@ -1,6 +1,5 @@
 //! Flights against a stand-in for a vehicle, under a clock of the test's own.
 
-mod fake;
 mod world;
 
 use quietpath_bridge::clock::Time;
@@ -10,10 +9,11 @@ use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Settings};
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::Identity;
 use quietpath_bridge::link::dialect::*;
-use quietpath_bridge::mission::Item;
+use quietpath_bridge::mission::{Item, List};
 use quietpath_bridge::record::{Recorder, replay};
 use quietpath_bridge::replan::{Answer, Observation};
 use quietpath_bridge::telemetry::{Autopilot, Mode};
+use quietpath_sim::autopilot::storage::ack;
 
 use world::{SCENARIO, World, plan, scenario, settings};
 
@@ -40,6 +40,9 @@ fn a_guided_flight_streams_before_it_asks_and_follows_the_plan_to_its_end() {
         world.pass(27.0);
         assert_eq!((world.level, world.power), (Some(0.0), Some(0.0)), "silent in the last quarter");
         world.pass(10.0);
+        assert_eq!(world.end, None, "it is not at the goal");
+        world.position = vec![19.0, 1.0];
+        world.pass(1.0);
         assert_eq!(world.end, Some(End::Done));
         assert_eq!((world.level, world.power), (Some(0.0), Some(1.0)));
     }
@@ -155,6 +158,7 @@ fn jamming_needs_the_switch_and_the_scenario() {
         let mut world = World::new(Autopilot::Px4, settings.clone());
         world.flight = Flight::new(&scenario, &plan(), settings).expect("a flight");
         world.begin(FlyMode::Guided);
+        world.position = vec![19.0, 1.0];
         world.pass(45.0);
         assert_eq!((world.level, world.power), (None, Some(1.0)), "armed {armed}, live {live}");
         assert_eq!(world.end, Some(End::Done));
@@ -162,7 +166,14 @@ fn jamming_needs_the_switch_and_the_scenario() {
 }
 
 fn replanning(mode: FlyMode) -> Settings {
-    let replan = Replanning { interval_s: 5.0, lead_s: 2.0, deadline_s: 1.0, time_to_live_s: 12.0, sigma_max: 1.0 };
+    let replan = Replanning {
+        interval_s: 5.0,
+        lead_s: 2.0,
+        deadline_s: 1.0,
+        time_to_live_s: 12.0,
+        sigma_max: 1.0,
+        prompt_lead_s: None,
+    };
     Settings { replan: Some(replan), ..settings(mode) }
 }
 
@@ -194,6 +205,51 @@ fn a_new_plan_takes_over_at_its_seam_without_a_jump() {
     assert!(jumps.max().expect("setpoints") < 60, "{:?}", world.said);
     let north = flown.iter().map(|(lat, _)| lat).max().expect("setpoints") - flown[0].0;
     assert!(north > 100, "the new plan is flown: {north}");
+}
+
+#[test]
+fn an_observation_asks_for_a_plan_at_once_where_it_may() {
+    for prompt_lead_s in [None, Some(0.25)] {
+        let mut settings = replanning(FlyMode::Guided);
+        settings.replan = settings.replan.map(|replan| Replanning { prompt_lead_s, ..replan });
+        let mut world = World::new(Autopilot::Px4, settings);
+        world.begin(FlyMode::Guided);
+        world.pass(1.0);
+        assert_eq!(world.jobs.len(), 0);
+        let seen = Observation::parse("{\"id\": \"s1\", \"position\": [9.5, 5.5]}").expect("an observation");
+        world.input(Input::Observed(seen));
+        assert_eq!(world.jobs.len(), usize::from(prompt_lead_s.is_some()));
+        let Some(job) = world.jobs.last() else { continue };
+        assert!((job.seam - 1.25).abs() < 0.05, "between two nodes: {}", job.seam);
+        let reply = answer(&world, 8.0);
+        world.input(Input::Planned(reply));
+        let before = world.setpoints.len();
+        world.pass(0.3);
+        assert!(world.said.iter().any(|text| text.contains("the plan of 1.2 s flies")), "{:?}", world.said);
+        assert!(world.setpoints.len() > before);
+    }
+}
+
+#[test]
+fn a_goal_that_is_not_reached_is_a_failure() {
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.begin(FlyMode::Guided);
+    world.pass(75.0);
+    assert!(
+        matches!(&world.end, Some(End::Failed(why)) if why.contains("did not come to the goal")),
+        "{:?}",
+        world.end
+    );
+}
+
+#[test]
+fn a_vehicle_that_began_anew_is_asked_again() {
+    let mut world = World::new(Autopilot::ArduPilot, settings(FlyMode::Guided));
+    world.begin(FlyMode::Guided);
+    world.mute = true;
+    world.pass(3.0);
+    assert!(world.said.iter().any(|text| text.contains("asking again")), "{:?}", world.said);
+    assert_eq!(world.flight.phase(), "fly");
 }
 
 #[test]
@@ -306,7 +362,7 @@ fn an_overheard_acceptance_is_looked_into() {
             world.missions.lists[0][5].x += 5000;
         }
         let station = Identity { system: 255, component: 190 };
-        world.frame(fake::ack(station, 0, MavMissionResult::MAV_MISSION_ACCEPTED, 0));
+        world.frame(ack(station, List::Mission.mission_type(), MavMissionResult::MAV_MISSION_ACCEPTED, 0));
         world.pass(3.0);
         let released = matches!(&world.end, Some(End::Released(why)) if why.contains("another station"));
         assert_eq!(released, replaced, "{:?} {:?}", world.end, world.said);

@@ -2,24 +2,22 @@
 
 #![cfg(unix)]
 
-mod fake;
-mod shared;
-
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use fake::{FakeVehicle, VEHICLE};
 use quietpath_bridge::clock::SystemClock;
 use quietpath_bridge::file::ScenarioFile;
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::dialect::*;
-use quietpath_bridge::link::{Accept, Endpoint, Event, Link, Signing};
+use quietpath_bridge::link::{Accept, Endpoint, Event, Identity, Link, Signing};
 use quietpath_bridge::telemetry::Autopilot;
-use shared::{Folder, SCENARIO, free_port, program, run, terminate};
+use quietpath_sim::autopilot::storage::Storage;
+use quietpath_tests::programs::{Folder, SCENARIO, bridge, free_port, run, terminate};
 
+const VEHICLE: Identity = Identity { system: 1, component: 1 };
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// What the vehicle saw.
@@ -77,7 +75,7 @@ impl Drop for Vehicle {
 }
 
 fn fly(mut link: Link, clock: SystemClock, stop: &AtomicBool, seen: &Mutex<Seen>) {
-    let mut missions = FakeVehicle::new(Autopilot::Px4);
+    let mut missions = Storage::new(Autopilot::Px4, VEHICLE);
     let (mut custom_mode, mut told) = (3 << 16, None);
     while !stop.load(Ordering::Relaxed) {
         let event = link.receive(Duration::from_millis(5));
@@ -193,7 +191,7 @@ fn a_signal_holds_the_vehicle_silences_the_jammer_and_leaves_a_record_that_repla
         ),
     );
     let config = folder.path("bridge.toml");
-    let child = program(&["run", "--config", &config, "--arm-jammer"]).spawn().expect("the program runs");
+    let child = bridge(&["run", "--config", &config, "--arm-jammer"]).spawn().expect("the program runs");
     vehicle.wait("jamming", |seen| seen.levels.last() == Some(&1.0));
     assert!(vehicle.seen().setpoints > 10);
     let (status, _, err) = terminate(child);
@@ -205,7 +203,7 @@ fn a_signal_holds_the_vehicle_silences_the_jammer_and_leaves_a_record_that_repla
     assert!(err.contains("outputs, bit for bit") && out.contains("send fd"), "{err}");
     // Without the switch nothing is ever said to the jammer.
     let before = vehicle.seen();
-    let child = program(&["run", "--config", &config]).spawn().expect("the program runs");
+    let child = bridge(&["run", "--config", &config]).spawn().expect("the program runs");
     vehicle.wait("setpoints", |seen| seen.setpoints > before.setpoints + 60);
     let (status, _, err) = terminate(child);
     assert_eq!((status, vehicle.seen().levels.len()), (4, before.levels.len()), "{err}");

@@ -1,6 +1,5 @@
 //! A vehicle that does what it is told at once, around a flight, under a clock of the test's own.
 
-use super::fake::{FakeVehicle, VEHICLE};
 use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
@@ -13,6 +12,9 @@ use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::record::Recorder;
 use quietpath_bridge::replan::Job;
 use quietpath_bridge::telemetry::{Airframe, Autopilot, Mode, mode_command};
+use quietpath_sim::autopilot::storage::Storage;
+
+pub const VEHICLE: Identity = Identity { system: 1, component: 1 };
 
 pub const SCENARIO: &str = r#"
 name = "line"
@@ -70,7 +72,7 @@ pub struct World {
     pub flight: Flight,
     pub kind: Autopilot,
     pub now: u64,
-    pub missions: FakeVehicle,
+    pub missions: Storage,
     pub armed: bool,
     pub landed: MavLandedState,
     pub custom_mode: u32,
@@ -78,6 +80,8 @@ pub struct World {
     pub position: Vec<f64>,
     pub current: Option<u16>,
     pub silent: bool,
+    /// Heartbeats alone.
+    pub mute: bool,
     pub level: Option<f32>,
     pub power: Option<f32>,
     pub servo: Option<f32>,
@@ -95,7 +99,7 @@ impl World {
             flight,
             kind,
             now: 0,
-            missions: FakeVehicle::new(kind),
+            missions: Storage::new(kind, VEHICLE),
             armed: false,
             landed: MavLandedState::MAV_LANDED_STATE_ON_GROUND,
             custom_mode: 0,
@@ -103,6 +107,7 @@ impl World {
             position: vec![0.5, 0.5],
             current: None,
             silent: false,
+            mute: false,
             level: None,
             power: None,
             servo: None,
@@ -150,7 +155,8 @@ impl World {
             MavMessage::GLOBAL_POSITION_INT(position),
             MavMessage::EXTENDED_SYS_STATE(landed),
         ];
-        rest.into_iter().chain(current).collect()
+        let said = if self.mute { 1 } else { rest.len() };
+        rest.into_iter().take(said).chain(current).collect()
     }
 
     pub fn input(&mut self, input: Input) {
