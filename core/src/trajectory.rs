@@ -13,6 +13,8 @@
 //!
 //! Limits: `NODES` holds N + 1 nodes, `AGENTS` agents.
 
+use core::cell::Cell;
+
 use crate::error::{Error, Fault, Item};
 use crate::math::{Point, Real, origin};
 use crate::scenario::View;
@@ -197,8 +199,16 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
 
 /// Moves entries `count` .. `count + left` to the front, and clears those behind them.
 fn drop_front<V: Copy>(list: &mut [V], count: usize, left: usize, nothing: V) {
-    list.rotate_left(count.min(list.len()));
+    shift(list, count);
     list.get_mut(left + 1..).unwrap_or_default().fill(nothing);
+}
+
+/// Moves entries from `count` on to the front; those behind them stay what they are.
+pub(crate) fn shift<V: Copy>(list: &mut [V], count: usize) {
+    let list = Cell::from_mut(list).as_slice_of_cells();
+    for (to, from) in list.iter().zip(list.iter().skip(count)) {
+        to.set(from.get());
+    }
 }
 
 fn copy_entry<V: Copy>(from: &[V], at: usize, to: &mut [V], end: usize) {

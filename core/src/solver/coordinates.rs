@@ -109,12 +109,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
     /// Copies the used part.
     pub(super) fn assign(&mut self, from: &Self, frame: &Frame<T, DIM, AGENTS>) {
         for (mine, theirs) in self.interior_mut(frame).zip(from.interior(frame)) {
-            mine.copy_from_slice(theirs);
+            copy(theirs, mine);
         }
         for (slot, _) in frame.equipment() {
-            self.levels_mut(slot, frame.intervals).copy_from_slice(from.levels(slot, frame.intervals));
+            copy(from.levels(slot, frame.intervals), self.levels_mut(slot, frame.intervals));
         }
         self.pace = from.pace;
+    }
+}
+
+/// Copies what is in both, and so has no lengths to disagree about.
+fn copy<V: Copy>(from: &[V], to: &mut [V]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
 

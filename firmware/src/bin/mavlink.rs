@@ -12,7 +12,7 @@ use cortex_m as _;
 use cortex_m_rt::entry;
 use defmt_semihosting as _;
 use mavlink::dialects::common::{MavFrame, MavMessage, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA};
-use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, ReadVersion};
+use mavlink::{MAVLinkV2MessageRaw, MavHeader, MavlinkReader, MavlinkVersion};
 use quietpath_firmware::finish;
 use quietpath_firmware::uart::Uart;
 use quietpath_flight::{Error, Flight, Memory, Setpoint, begin, fly, is_over, replan, setpoint};
@@ -51,12 +51,11 @@ fn run(memory: &mut Memory) -> Result<u32, Error> {
     let mut vehicle = None;
     let mut start_ms = None;
     loop {
-        let Ok((from, message)) = reader.read_message::<MavMessage>(ReadVersion::Single(mavlink::MavlinkVersion::V2))
-        else {
-            continue;
-        };
+        let Ok((from, message)) = reader.read_message::<MavMessage>(MavlinkVersion::V2) else { continue };
         match message {
-            MavMessage::HEARTBEAT(_) => vehicle = Some((from.system_id, from.component_id)),
+            MavMessage::HEARTBEAT(_) => {
+                vehicle = u8::try_from(from.system_id).ok().map(|system| (system, from.component_id));
+            }
             MavMessage::LOCAL_POSITION_NED(found) => {
                 let Some((system, component)) = vehicle else { continue };
                 let start_ms = *start_ms.get_or_insert(found.time_boot_ms);
@@ -67,7 +66,7 @@ fn run(memory: &mut Memory) -> Result<u32, Error> {
                     plans += 1;
                 }
                 let wanted = setpoint(&flight, time);
-                header.system_id = system;
+                header.system_id = system.into();
                 send(&mut line, &mut header, &target(&wanted, (system, component), found.time_boot_ms));
                 if has_arrived(&flight, &wanted, [found.y, found.x]) {
                     return Ok(plans);

@@ -388,7 +388,7 @@ fn columns_solved<T: Real, const DIM: usize>(
 ) -> [Point<T, DIM>; KINDS] {
     let mut solved = [Point::<T, DIM>::zeros(); KINDS];
     for component in 0..DIM {
-        let values = local.solve(core::array::from_fn(|kind| coupling[kind][component]));
+        let values = local.solve(coupling.each_ref().map(|part| part.get(component).copied().unwrap_or(T::zero())));
         for (kind, value) in values.into_iter().enumerate() {
             solved[kind][component] = value;
         }
