@@ -86,8 +86,8 @@ pub struct QuietpathAgent {
     pub softening: f32,
     /// Intervals of the plan, 2 to `QUIETPATH_INTERVALS_MAX`.
     pub intervals: u32,
-    /// What is wanted.
-    pub objective: QuietpathObjective,
+    /// What is wanted: a `QuietpathObjective`.
+    pub objective: u32,
 }
 
 /// A sensor, as it was seen; it keeps its velocity.
@@ -145,7 +145,7 @@ pub unsafe extern "C" fn quietpath_create(memory: *mut core::ffi::c_void, bytes:
         return core::ptr::null_mut();
     }
     // SAFETY: it is aligned, large enough and the caller's.
-    unsafe { place.write(QuietpathPlanner(Planner::new())) };
+    unsafe { place.write(const { QuietpathPlanner(Planner::new()) }) };
     place
 }
 

@@ -21,12 +21,30 @@ type Problem = Scenario<f32, 2, QUIETPATH_SENSORS_MAX, 1, 1>;
 /// The flight, as planned and as flown.
 type Flight = Horizon<f32, 2, NODES, 1>;
 
+/// A flight, once there is one. The tag is a number of its own, so that nothing is all zeros.
+#[repr(u8)]
+#[expect(clippy::large_enum_variant, reason = "memory is set aside for a flight in any case")]
+enum Flown {
+    Nothing,
+    Flight(Flight),
+}
+
+impl Flown {
+    const fn get(&self) -> Option<&Flight> {
+        if let Self::Flight(flight) = self { Some(flight) } else { None }
+    }
+
+    const fn get_mut(&mut self) -> Option<&mut Flight> {
+        if let Self::Flight(flight) = self { Some(flight) } else { None }
+    }
+}
+
 /// A planner, with all of its memory.
 pub(crate) struct Planner {
     workspace: Workspace<f32, 2, NODES, QUIETPATH_SENSORS_MAX, 1>,
     agent: Option<QuietpathAgent>,
     sensors: [Option<QuietpathSensor>; QUIETPATH_SENSORS_MAX],
-    flight: Option<Flight>,
+    flight: Flown,
     objective: f32,
 }
 
@@ -36,14 +54,16 @@ impl Planner {
             workspace: Workspace::new(),
             agent: None,
             sensors: [None; QUIETPATH_SENSORS_MAX],
-            flight: None,
-            objective: f32::NAN,
+            flight: Flown::Nothing,
+            // All zeros, so that memory is cleared and not copied.
+            objective: 0.0,
         }
     }
 
     pub(crate) fn set_agent(&mut self, agent: &QuietpathAgent) -> QuietpathResult {
-        self.flight = None;
-        if agent.intervals < 2 || agent.intervals as usize > QUIETPATH_INTERVALS_MAX {
+        self.flight = Flown::Nothing;
+        let is_known = wanted(agent.objective).is_some();
+        if !is_known || agent.intervals < 2 || agent.intervals as usize > QUIETPATH_INTERVALS_MAX {
             return QuietpathResult::Invalid;
         }
         self.agent = Some(*agent);
@@ -65,14 +85,14 @@ impl Planner {
             Err(error) => Err(error),
         };
         match made {
-            Ok(flight) => self.flight = Some(flight),
+            Ok(flight) => self.flight = Flown::Flight(flight),
             Err(_) => return QuietpathResult::Invalid,
         }
         self.step()
     }
 
     pub(crate) fn replan(&mut self, time: f32, position: [f32; 2], velocity: [f32; 2]) -> QuietpathResult {
-        let Some(flight) = &mut self.flight else { return QuietpathResult::Order };
+        let Some(flight) = self.flight.get_mut() else { return QuietpathResult::Order };
         let state = State { position: Point::from(position), velocity: Point::from(velocity) };
         if flight.resume(time, &[state]).is_err() {
             return QuietpathResult::Invalid;
@@ -82,7 +102,7 @@ impl Planner {
 
     /// Plans what is left of the flight.
     fn step(&mut self) -> QuietpathResult {
-        let (Some(agent), Some(flight)) = (&self.agent, &mut self.flight) else { return QuietpathResult::Order };
+        let (Some(agent), Some(flight)) = (&self.agent, self.flight.get_mut()) else { return QuietpathResult::Order };
         let settings = Settings::frugal();
         let step = match &problem(agent, &self.sensors) {
             Ok(problem) => {
@@ -96,7 +116,7 @@ impl Planner {
     }
 
     pub(crate) fn nodes(&self) -> impl Iterator<Item = QuietpathNode> {
-        self.flight.iter().flat_map(|flight| {
+        self.flight.get().into_iter().flat_map(|flight| {
             let tail = flight.tail();
             let path = tail.active().iter().flat_map(|track| track.path.iter());
             let nodes = path.zip(&tail.times).take(tail.nodes());
@@ -104,9 +124,19 @@ impl Planner {
         })
     }
 
-    pub(crate) const fn objective(&self) -> f32 {
-        self.objective
+    pub(crate) fn objective(&self) -> f32 {
+        if self.flight.get().is_some() { self.objective } else { f32::NAN }
     }
+}
+
+/// Metric and sense of a number that C has for an objective.
+fn wanted(objective: u32) -> Option<(Metric, Sense)> {
+    [
+        (QuietpathObjective::Detection, (Metric::Detection, Sense::Minimize)),
+        (QuietpathObjective::Location, (Metric::LogAee, Sense::Maximize)),
+    ]
+    .into_iter()
+    .find_map(|(known, wanted)| (known as u32 == objective).then_some(wanted))
 }
 
 /// The core's problem out of C's.
@@ -135,10 +165,7 @@ fn problem(flies: &QuietpathAgent, seen: &[Option<QuietpathSensor>]) -> Result<P
             (seen.range_c1 != 0.0).then_some(Ranging::Toa { c1: seen.range_c1, c2: seen.range_c2, path_loss });
         count += 1;
     }
-    let (metric, sense) = match flies.objective {
-        QuietpathObjective::Detection => (Metric::Detection, Sense::Minimize),
-        QuietpathObjective::Location => (Metric::LogAee, Sense::Maximize),
-    };
+    let (metric, sense) = wanted(flies.objective).unwrap_or((Metric::Detection, Sense::Minimize));
     Scenario::new(&Draft {
         softening: flies.softening,
         reference_point: ReferencePoint::Current,
