@@ -8,20 +8,13 @@ use quietpath_core::solver::{Bounds, Outcome, Settings, Start, Workspace, plan};
 
 type Memory = Workspace<f64, 2, 9, 8, 3>;
 
-fn settings() -> [Settings<f64>; 4] {
-    let plain = Settings::default();
+fn settings() -> [Settings<f64>; 3] {
+    // Too little to come to rest, so that the settings are what ends a plan.
+    let little = Settings { variants: 1, candidates: 1, projection_steps: 5, tolerance: 0.0, ..Settings::default() };
     [
-        Settings {
-            iterations: 3,
-            refinements: 2,
-            projection_steps: 5,
-            line_search_steps: 1,
-            tolerance: 0.0,
-            ..plain
-        },
-        Settings { iterations: 8, refinements: 0, variants: 1, candidates: 0, tolerance: 0.0, ..plain },
-        Settings { iterations: 0, refinements: 3, variants: 0, tolerance: 0.0, ..plain },
-        Settings::frugal(),
+        Settings { iterations: 3, refinements: 2, line_search_steps: 1, ..little },
+        Settings { iterations: 0, refinements: 3, variants: 0, candidates: 0, ..little },
+        Settings { iterations: 8, ..Settings::frugal() },
     ]
 }
 
@@ -45,10 +38,11 @@ fn no_plan_takes_more_than_its_settings_allow() {
     let mut nearest = [0.0_f64; 5];
     let mut planned = 0;
     let all: Vec<Made<2>> = scenarios();
-    for made in &all {
+    for (number, made) in all.iter().enumerate() {
         let Ok(stored) = made.stored() else { continue };
         let agents = made.agents.len();
-        for settings in settings() {
+        // One of them each: all would take long.
+        for settings in settings().into_iter().skip(number % 3).take(1) {
             let starts =
                 [(Start::Straight, settings.bounds_near()), (Start::Global, settings.bounds_everywhere(agents))];
             for (start, bounds) in starts {

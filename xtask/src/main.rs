@@ -112,14 +112,16 @@ fn run(command: &Command) -> anyhow::Result<bool> {
 }
 
 fn check() -> Vec<Step> {
+    let lints_of_firmware = format!(
+        "clippy --manifest-path firmware/Cargo.toml --target-dir target/firmware --workspace --release --target {} -- -D warnings",
+        target::TARGET
+    );
     vec![
         Step::cargo("formatting", "fmt --all --check"),
         Step::cargo("formatting of the firmware", "fmt --manifest-path firmware/Cargo.toml --all --check"),
         Step::cargo("lints", "clippy --workspace --all-targets -- -D warnings"),
-        Step::cargo(
-            "lints of the core with defmt",
-            "clippy --package quietpath-core --features defmt -- -D warnings",
-        ),
+        Step::new("target installed", "rustup", &format!("target add {}", target::TARGET)),
+        Step::cargo("lints of the firmware", &lints_of_firmware),
         Step::cargo("documentation", "doc --workspace --no-deps --document-private-items")
             .with_env("RUSTDOCFLAGS", "-D warnings"),
     ]

@@ -27,11 +27,19 @@ pub struct Settings<T> {
 }
 
 impl<T: Real> Settings<T> {
-    /// Little work, for a microcontroller: two lattice searches, the better of which is polished, and a tenth of the default
-    /// iterations.
+    /// Little work, for a microcontroller: two lattice searches, the better of which is polished, a tenth of the default
+    /// iterations or fewer, and a coarse end.
     #[must_use]
     pub fn frugal() -> Self {
-        Self { variants: 2, candidates: 1, iterations: 40, refinements: 24, projection_steps: 40, ..Self::default() }
+        Self {
+            variants: 2,
+            candidates: 1,
+            iterations: 40,
+            refinements: 6,
+            projection_steps: 40,
+            tolerance: T::real(1e-3),
+            ..Self::default()
+        }
     }
 }
 
