@@ -5,8 +5,8 @@
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
 
 mod count;
+mod firmware;
 mod step;
-mod target;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -14,8 +14,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 
+use firmware::Table;
 use step::Step;
-use target::Table;
 
 /// Scenarios whose landscape, with the path through it, is shown on the pages.
 const PICTURES: [&str; 2] = ["square8-detection", "square8-aee"];
@@ -89,16 +89,16 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Check => check(),
         Command::Test => test(),
-        Command::Target => return target::target(top),
-        Command::Header => return target::header(top),
-        Command::Instructions => return target::instructions(top),
+        Command::Target => return firmware::target(top),
+        Command::Header => return firmware::header(top),
+        Command::Instructions => return firmware::instructions(top),
         Command::Sizes { compare, write } => {
             let table = match (*compare, *write) {
                 (true, _) => Table::Compare,
                 (_, true) => Table::Write,
                 _ => Table::Ignore,
             };
-            return target::sizes(table, top);
+            return firmware::sizes(table, top);
         }
         Command::Ci => check().into_iter().chain(test()).collect(),
         Command::Pictures => pictures(),
@@ -114,13 +114,13 @@ fn run(command: &Command) -> anyhow::Result<bool> {
 fn check() -> Vec<Step> {
     let lints_of_firmware = format!(
         "clippy --manifest-path firmware/Cargo.toml --target-dir target/firmware --workspace --release --target {} -- -D warnings",
-        target::TARGET
+        firmware::TARGET
     );
     vec![
         Step::cargo("formatting", "fmt --all --check"),
         Step::cargo("formatting of the firmware", "fmt --manifest-path firmware/Cargo.toml --all --check"),
         Step::cargo("lints", "clippy --workspace --all-targets -- -D warnings"),
-        Step::new("target installed", "rustup", &format!("target add {}", target::TARGET)),
+        Step::new("target installed", "rustup", &format!("target add {}", firmware::TARGET)),
         Step::cargo("lints of the firmware", &lints_of_firmware),
         Step::cargo("documentation", "doc --workspace --no-deps --document-private-items")
             .with_env("RUSTDOCFLAGS", "-D warnings"),
