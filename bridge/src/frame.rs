@@ -78,6 +78,12 @@ impl LocalFrame {
         Self { geodesic: Geodesic::wgs84(), origin, unit_m, dimension }
     }
 
+    /// A frame in two dimensions about an origin, `unit_m` metres a length unit.
+    #[must_use]
+    pub fn new(origin: Origin, unit_m: f64) -> Self {
+        Self { geodesic: Geodesic::wgs84(), origin, unit_m, dimension: 2 }
+    }
+
     /// Metres in a length unit.
     #[must_use]
     pub const fn unit_m(&self) -> f64 {

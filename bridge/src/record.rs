@@ -202,48 +202,108 @@ pub struct Replayed {
     pub outputs: usize,
 }
 
-/// Feeds a record to a new flight; `each` gets every input's time and outputs.
+/// Reads a record, line by line as it is written, and feeds it to a flight.
+pub struct Reader {
+    name: String,
+    lines: BufReader<File>,
+    /// The line that is being read: a record that grows may end in the middle of one.
+    line: String,
+    number: usize,
+    scenario: ScenarioFile,
+    flight: Flight,
+}
+
+/// A line of a record, fed to the flight.
+#[derive(Clone, Debug)]
+pub struct Fed {
+    /// Time of the input.
+    pub time: Time,
+    /// The input.
+    pub input: Input,
+    /// What came out of it now.
+    pub outputs: Vec<Output>,
+    /// What came out of it then, as text.
+    recorded: Vec<String>,
+}
+
+const RECORD: &str = "give the file that `quietpath-bridge run --record` wrote";
+
+impl Reader {
+    /// Opens a record, and makes the flight that it is of.
+    ///
+    /// # Errors
+    /// A file that is no record.
+    pub fn open(path: &Path) -> Result<Self, Box<FileError>> {
+        let name = path.display().to_string();
+        let fail = |message: String, help: &str| Box::new(FileError::whole(&format!("{name}:1"), message, help));
+        let file = File::open(path).map_err(|error| fail(format!("cannot be read: {error}"), RECORD))?;
+        let mut lines = BufReader::new(file);
+        let mut first = String::new();
+        lines.read_line(&mut first).map_err(|error| fail(format!("cannot be read: {error}"), RECORD))?;
+        let header: Header =
+            serde_json::from_str(&first).map_err(|error| fail(format!("is no record: {error}"), RECORD))?;
+        if header.quietpath_record != VERSION {
+            let version = header.quietpath_record;
+            let message = format!("is a record of version {version}, and this program reads {VERSION}");
+            return Err(fail(message, "replay it with the program that wrote it"));
+        }
+        let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
+        let flight = Flight::new(&scenario, &header.plan, header.settings)?;
+        Ok(Self { name, lines, line: String::new(), number: 1, scenario, flight })
+    }
+
+    /// The scenario that the flight began with.
+    #[must_use]
+    pub const fn scenario(&self) -> &ScenarioFile {
+        &self.scenario
+    }
+
+    /// The flight, as it is after the lines that have been read.
+    #[must_use]
+    pub const fn flight(&self) -> &Flight {
+        &self.flight
+    }
+
+    /// Feeds the next line; `None` where there is none yet, or the last one is not complete.
+    ///
+    /// # Errors
+    /// A line that cannot be read.
+    pub fn feed(&mut self) -> Result<Option<Fed>, Box<FileError>> {
+        let number = self.number + 1;
+        let name = &self.name;
+        let fail = |message: String| Box::new(FileError::whole(&format!("{name}:{number}"), message, RECORD));
+        self.lines.read_line(&mut self.line).map_err(|error| fail(format!("cannot be read: {error}")))?;
+        if !self.line.ends_with('\n') {
+            return Ok(None);
+        }
+        let parsed: Line = serde_json::from_str(&self.line).map_err(|error| fail(format!("is broken: {error}")))?;
+        let input = parsed.input.and_then(Written::into_input).ok_or_else(|| fail("holds no input".into()))?;
+        self.line.clear();
+        self.number = number;
+        let outputs = self.flight.step(parsed.t, input.clone());
+        Ok(Some(Fed { time: parsed.t, input, outputs, recorded: parsed.output.unwrap_or_default() }))
+    }
+}
+
+/// Feeds a record to a new flight; `each` gets every input's time and outputs. A record that ends in the middle of a line was
+/// cut off by a loss of power: what stands before counts.
 ///
 /// # Errors
 /// A file that is no record; the first line whose outputs differ, with both.
 pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Replayed, Box<FileError>> {
-    let name = path.display().to_string();
-    let fail = |line: usize, message: String, help: &str| {
-        Box::new(FileError::whole(&format!("{name}:{line}"), message, help))
-    };
-    let record = "give the file that `quietpath-bridge run --record` wrote";
-    let file = File::open(path).map_err(|error| fail(1, format!("cannot be read: {error}"), record))?;
-    let mut lines = BufReader::new(file).lines().enumerate();
-    let first = lines.next().and_then(|(_, line)| line.ok()).unwrap_or_default();
-    let header: Header =
-        serde_json::from_str(&first).map_err(|error| fail(1, format!("is no record: {error}"), record))?;
-    if header.quietpath_record != VERSION {
-        let message = format!("is a record of version {}, and this program reads {VERSION}", header.quietpath_record);
-        return Err(fail(1, message, "replay it with the program that wrote it"));
-    }
-    let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
-    let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
+    let mut reader = Reader::open(path)?;
     let mut replayed = Replayed { inputs: 0, outputs: 0 };
-    for (index, line) in lines {
-        let line = line.map_err(|error| fail(index + 1, format!("cannot be read: {error}"), record))?;
-        let parsed: Result<Line, _> = serde_json::from_str(&line);
-        let Line { t, input, output } = match parsed {
-            Ok(line) => line,
-            // A record that ends in the middle of a line was cut off by a loss of power.
-            Err(error) if error.is_eof() => break,
-            Err(error) => return Err(fail(index + 1, format!("is broken: {error}"), record)),
-        };
-        let input =
-            input.and_then(Written::into_input).ok_or_else(|| fail(index + 1, "holds no input".into(), record))?;
-        let outputs: Vec<String> = flight.step(t, input).iter().map(written).collect();
-        let recorded = output.unwrap_or_default();
+    while let Some(Fed { time, outputs, recorded, .. }) = reader.feed()? {
+        let outputs: Vec<String> = outputs.iter().map(written).collect();
         if outputs != recorded {
             let message = format!("came out differently\n  then {recorded:?}\n  now  {outputs:?}");
-            return Err(fail(index + 1, message, "the program is another one than the one that flew"));
+            let (place, help) =
+                (format!("{}:{}", reader.name, reader.number), "the program is another one than the one that flew");
+            return Err(Box::new(FileError::whole(&place, message, help)));
         }
         replayed.inputs += 1;
         replayed.outputs += outputs.len();
-        each(t, &outputs);
+        each(time, &outputs);
     }
     Ok(replayed)
 }

@@ -1,4 +1,5 @@
-//! The program with other people's MAVLink: pymavlink and MAVSDK play the vehicle, and pymavlink reads our files.
+//! The program with other people's MAVLink: pymavlink and MAVSDK play the vehicle, and pymavlink reads our files;
+//! and our JSON Schema with somebody else's validator.
 //!
 //! These tests make a Python environment under `target/` and fill it from PyPI, so they run where they are asked for:
 //! `cargo xtask test`, or `cargo test -p quietpath-bridge --test interoperate -- --ignored`.
@@ -16,7 +17,7 @@ use std::time::Duration;
 use serde_json::Value;
 use shared::{Folder, free_port, program, run, terminate};
 
-const PACKAGES: [&str; 2] = ["pymavlink==2.4.50", "mavsdk==4.1.0"];
+const PACKAGES: [&str; 3] = ["pymavlink==2.4.50", "mavsdk==4.1.0", "jsonschema==4.26.0"];
 const KEY: &str = "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff";
 
 /// The Python of an environment that has both.
@@ -26,14 +27,17 @@ fn python() -> &'static Path {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("mavlink");
         let python = folder.join("bin/python");
         let has = |python: &Path| {
-            let probe = Command::new(python).args(["-c", "import pymavlink, mavsdk"]).stderr(Stdio::null()).status();
+            let probe = Command::new(python)
+                .args(["-c", "import pymavlink, mavsdk, jsonschema"])
+                .stderr(Stdio::null())
+                .status();
             probe.is_ok_and(|status| status.success())
         };
         if !has(&python) {
             succeed(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder));
             succeed(Command::new(folder.join("bin/pip")).args(["install", "--quiet"]).args(PACKAGES));
         }
-        assert!(has(&python), "{} lacks pymavlink or mavsdk", python.display());
+        assert!(has(&python), "{} lacks pymavlink, mavsdk or jsonschema", python.display());
         python
     })
 }
@@ -162,4 +166,36 @@ fn mavsdk_receives_a_mission_and_gives_it_back() {
     let mission = got["got"].as_array().and_then(|missions| missions.first()).expect("a mission");
     let commands: Vec<u64> = mission.as_array().expect("a list").iter().filter_map(|item| item[0].as_u64()).collect();
     assert_eq!(commands, [22, 16, 178, 16, 16, 16, 16], "{got}");
+}
+
+#[test]
+#[ignore = "makes a Python environment"]
+fn jsonschema_finds_our_scenarios_valid_and_spoilt_ones_not() {
+    let folder = Folder::new();
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sim/scenarios");
+    let mut paths: Vec<String> = std::fs::read_dir(&scenarios)
+        .expect("scenarios")
+        .map(|entry| entry.expect("an entry").path().to_str().expect("text").to_owned())
+        .collect();
+    let good = std::fs::read_to_string(scenarios.join("square8-detection.toml")).expect("a scenario");
+    let spoilt = [("speed_max", "speed_most"), ("\"proxy\"", "\"proxies\""), ("intervals = 60", "intervals = 0")];
+    for (index, (from, to)) in spoilt.iter().enumerate() {
+        let name = format!("spoilt{index}.toml");
+        folder.write(&name, &good.replacen(from, to, 1));
+        paths.push(folder.path(&name));
+    }
+    let mut command = Command::new(python());
+    let mut child =
+        command.arg(script("validate.py")).args(&paths).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let child = child.as_mut().expect("Python runs");
+    let schema = quietpath_bridge::file::schema::scenario_schema();
+    child.stdin.take().expect("a pipe").write_all(schema.as_bytes()).expect("it reads");
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut child.stdout.take().expect("a pipe"), &mut text).expect("it writes");
+    assert!(child.wait().expect("it ends").success());
+    let errors: Value = serde_json::from_str(&text).expect("a line of JSON");
+    for path in &paths {
+        let found = errors[path].as_array().expect("a list");
+        assert_eq!(found.is_empty(), !path.contains("spoilt"), "{path}: {found:?}");
+    }
 }

@@ -1,5 +1,7 @@
 //! The command line: what can be asked, and how each command is explained.
 
+mod fly;
+
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,6 +11,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::autopilot::Home;
 use crate::trade::{Amount, Over};
 
+pub use fly::{FlyArgs, FlyModeArg, ViewArgs};
+
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Green.on_default().bold())
     .usage(AnsiColor::Green.on_default().bold())
@@ -16,9 +20,10 @@ const STYLES: Styles = Styles::styled()
     .placeholder(AnsiColor::Cyan.on_default());
 
 const AFTER: &str = "\
-Without a command, the built-in scenario `square8-detection` is planned into the folder `out`.
+Without a command, the built-in scenario `wight-jam` is planned and flown in simulation, over MAVLink, into the folder
+`out`.
 
-Exit status: 0 done, 1 the plan is not feasible, 2 bad input or usage.
+Exit status: 0 done, 1 the plan is not feasible or the flight did not arrive, 2 bad input or usage.
 
 Example:
   quietpath new scenario.toml && quietpath plan scenario.toml --out out";
@@ -35,7 +40,7 @@ pub struct Cli {
 /// What can be asked.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Plan a flight; print a summary, write the plan, pictures and mission files
+    /// Plan a flight; print a summary, write the plan, a report, pictures and mission files
     #[command(after_help = "\
 A scenario with `[rolling]` is planned in steps, each of which knows the world as it is by then; what is written, and
 weighed, is the path that was flown, and `steps/` in the folder holds the plan of each step.
@@ -45,6 +50,28 @@ Exit status: 0 planned, 1 no feasible plan found, 2 bad input.
 Example:
   quietpath plan scenario.toml --out out")]
     Plan(PlanArgs),
+    /// Plan a scenario and fly it over MAVLink, in simulation or with an autopilot elsewhere
+    #[command(after_help = "\
+The bridge knows where sensors are, hears where they move, and plans anew in flight; frames pass two UDP sockets on
+127.0.0.1. The same seed flies the same flight. With --connect, the vehicle is one that somebody else has started and
+takes off; sensors are the scenario's, nothing is jammed, and quietpath autopilot is such a vehicle. Ctrl-C ends the
+flight, and what was flown is written all the same.
+
+Exit status: 0 at the goal, 1 ended before it, 2 bad input.
+
+Example:
+  quietpath fly scenario.toml --like ardupilot --mode mission --loss 0.1 --out out")]
+    Fly(FlyArgs),
+    /// Show a flight of `quietpath-bridge` to browsers on this machine while it goes on
+    #[command(after_help = "\
+The page follows the record of the flight as it is written; it cannot change anything. `quietpath fly --view` shows a
+simulated flight. Ctrl-C ends it.
+
+Exit status: 0 ended, 2 bad input.
+
+Example:
+  quietpath view flight.jsonl")]
+    View(ViewArgs),
     /// Plan over a range of deadlines or budgets, and draw what each buys
     #[command(after_help = "\
 Values have units: 105% of the shortest flight time (deadline) or of the flight's time (budgets), 18.7s; plain numbers
@@ -66,13 +93,55 @@ at the centres of the cells and in the scenario's units.
 Example:
   quietpath landscape scenario.toml --metric log_aee --out landscape.png --out landscape.csv")]
     Landscape(LandscapeArgs),
-    /// Recompute the objective and the violations of a plan
+    /// Look a scenario over and give advice, or recompute the objective and the violations of a plan
     #[command(after_help = "\
-Exit status: 0 feasible, 1 not feasible, 2 bad input.
+Without a plan: margins, goals that cannot be reached, sensors that do nothing.
+
+Exit status: 0 feasible, 1 not feasible or out of reach, 2 bad input.
 
 Example:
   quietpath check scenario.toml out/plan.json")]
     Check(CheckArgs),
+    /// Put a plan on a page: map, diagrams, constraints, provenance, in one HTML file
+    #[command(after_help = "\
+The page needs no network and no program but a browser. `quietpath plan --out` writes it too.
+
+Exit status: 0 written, 1 written and the plan is not feasible, 2 bad input.
+
+Example:
+  quietpath report scenario.toml out/plan.json --out report.html")]
+    Report(ReportArgs),
+    /// Fly a plan many times through a world that is not quite the scenario's, and say how that went
+    #[command(after_help = "\
+What varies stands in the scenario's [study]: sensor positions, path loss, wind. Runs are written as they are done;
+started again with the same arguments, the study goes on where it was ended.
+
+Exit status: 0 flown, 2 bad input.
+
+Example:
+  quietpath study scenario.toml --runs 1000 --out study")]
+    Study(StudyArgs),
+    /// Put the shards of a study together
+    #[command(after_help = "\
+Example:
+  quietpath merge --out study shards/runs-1-of-2.jsonl shards/runs-2-of-2.jsonl")]
+    Merge(MergeArgs),
+    /// Make a scenario from QGroundControl plans, GeoJSON, KML or tables of sensors
+    #[command(after_help = "\
+From .plan: home, first and last waypoint, cruise speed, fences. From .geojson and .kml: points as sensors, polygons
+as regions to keep out of. From .csv: sensors, by name and latitude, longitude or east_m, north_m.
+What stands in no file is taken from the starter scenario and marked `assumed`.
+
+Example:
+  quietpath import mission.plan sensors.csv --out scenario.toml")]
+    Import(ImportArgs),
+    /// Print the JSON Schema of scenario files, for editors
+    #[command(after_help = "\
+An editor with support for TOML takes it from a first line `#:schema scenario.schema.json`.
+
+Example:
+  quietpath schema > scenario.schema.json")]
+    Schema,
     /// Write a commented scenario to start from
     #[command(after_help = "\
 Example:
@@ -101,7 +170,7 @@ Example:
 pub struct PlanArgs {
     /// Scenario file; `-` reads it from standard input
     pub scenario: String,
-    /// Folder for plan.json, pictures and mission files; made where it is missing
+    /// Folder for plan.json, report.html, pictures and mission files; made where it is missing
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// File for the plan alone; `-` writes it to standard output and the summary to standard error
@@ -174,7 +243,90 @@ pub struct CheckArgs {
     /// Scenario file; `-` reads it from standard input
     pub scenario: String,
     /// Plan file; `-` reads it from standard input
+    pub plan: Option<String>,
+}
+
+/// Arguments of `quietpath report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Scenario file; `-` reads it from standard input
+    pub scenario: String,
+    /// Plan file; `-` reads it from standard input
     pub plan: String,
+    /// Metric that the map shows first [default: that of the first objective term]
+    #[arg(long, value_name = "NAME", value_enum)]
+    pub metric: Option<MetricArg>,
+    /// File to write
+    #[arg(long, value_name = "FILE", default_value = "report.html")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `quietpath study`.
+#[derive(Debug, Args)]
+pub struct StudyArgs {
+    /// Scenario file with `[study]`; `-` reads it from standard input
+    pub scenario: String,
+    /// Number of runs
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pub runs: u64,
+    /// Plan file to fly [default: the scenario is planned]
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<String>,
+    /// Plan a scenario with `[rolling]` in one piece, every track known
+    #[arg(long)]
+    pub once: bool,
+    /// Fly the I-th part of N alone, such as 1/4
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Folder for runs, summary and pictures; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "study")]
+    pub out: PathBuf,
+}
+
+/// A part of a study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which part, from 1.
+    pub index: u32,
+    /// How many parts there are.
+    pub count: u32,
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self { index, count }),
+            _ => Err("write I/N with I from 1 to N, such as 1/4".into()),
+        }
+    }
+}
+
+/// Arguments of `quietpath merge`.
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// Files of runs
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Folder for runs, summary and pictures; made where it is missing
+    #[arg(long, value_name = "DIR", default_value = "study")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `quietpath import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// Files: .plan, .geojson, .kml, .csv
+    #[arg(required = true)]
+    pub files: Vec<PathBuf>,
+    /// Scenario file to write; `-` for standard output
+    #[arg(long, value_name = "FILE", default_value = "scenario.toml")]
+    pub out: PathBuf,
+    /// Overwrite a file that exists
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Arguments of `quietpath new`.

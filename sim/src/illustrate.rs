@@ -117,7 +117,8 @@ fn landscape_subtitle(scenario: &ScenarioFile, field: &planning::Grid, plan: Opt
 }
 
 /// Duration, length and objective of a plan in a few words.
-fn flight_words(scenario: &ScenarioFile, plan: &PlanFile) -> String {
+#[must_use]
+pub fn flight_words(scenario: &ScenarioFile, plan: &PlanFile) -> String {
     let metres: f64 = plan.agents.iter().map(|agent| path_length(&agent.path)).sum::<f64>() * scenario.frame.unit_m;
     let objective = plan.objective.map(|value| format!(", objective {}", trimmed(value))).unwrap_or_default();
     let status = plan.status.as_ref().map(|status| format!(" ({})", status.replace('_', " "))).unwrap_or_default();
@@ -182,10 +183,26 @@ pub fn flight(scenario: &ScenarioFile, agent: &AgentPlan, name: &str, colour: &s
 /// Draws every figure along the flight.
 #[must_use]
 pub fn series(scenario: &ScenarioFile, flown: Flown<'_>) -> Picture {
-    let Flown { plan, assessment, steps } = flown;
-    let times = plan.node_times();
+    let Flown { plan, steps, .. } = flown;
     let (time_unit, second) = time_unit(plan.duration);
-    let times: Vec<f64> = times.into_iter().map(|time| time / second).collect();
+    let times = plan.node_times();
+    let edge = |time: Option<&f64>| time.map(|time| time / second);
+    series::draw(&Sheet {
+        title: format!("{}: along the flight", scenario.name),
+        subtitle: flight_words(scenario, plan),
+        time_unit,
+        time: [edge(times.first()).unwrap_or(0.0), edge(times.last()).unwrap_or(1.0)],
+        agents: scenario.agents.iter().map(|agent| agent.name.clone()).collect(),
+        steps: steps.iter().skip(1).map(|step| step.time() / second).collect(),
+        panels: panels(scenario, flown, second),
+    })
+}
+
+/// The diagrams of every figure along the flight, times in units of `second` seconds.
+#[must_use]
+pub fn panels(scenario: &ScenarioFile, flown: Flown<'_>, second: f64) -> Vec<Panel> {
+    let Flown { plan, assessment, .. } = flown;
+    let times: Vec<f64> = plan.node_times().into_iter().map(|time| time / second).collect();
     let mut panels: Vec<Panel> =
         DIAGRAMS.iter().filter_map(|metric| metric_panel(scenario, assessment, &times, *metric)).collect();
     panels.push(kinematic_panel(scenario, assessment, &times, Kinematic::Speed));
@@ -195,15 +212,7 @@ pub fn series(scenario: &ScenarioFile, flown: Flown<'_>) -> Picture {
         ("Dropout (1: silent)", plan.agents.iter().map(|agent| agent.dropout.as_deref()).collect()),
     ];
     panels.extend(controls.into_iter().filter_map(|(title, values)| control_panel(title, &values, &times)));
-    series::draw(&Sheet {
-        title: format!("{}: along the flight", scenario.name),
-        subtitle: flight_words(scenario, plan),
-        time_unit,
-        time: [times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(1.0)],
-        agents: scenario.agents.iter().map(|agent| agent.name.clone()).collect(),
-        steps: steps.iter().skip(1).map(|step| step.time() / second).collect(),
-        panels,
-    })
+    panels
 }
 
 fn lines<'a>(times: &[f64], values: impl Iterator<Item = &'a [f64]>) -> Vec<Line> {

@@ -166,3 +166,14 @@ pub fn progress_bar(what: &'static str) -> ProgressBar {
     bar.enable_steady_tick(Duration::from_millis(120));
     bar
 }
+
+/// A bar with the time that is left, for many equal parts of a task; nothing in a pipe.
+#[must_use]
+pub fn counting_bar(what: &'static str, parts: u64) -> ProgressBar {
+    let bar = progress_bar(what);
+    bar.set_length(parts);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {wide_bar} {pos}/{len} {elapsed}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}

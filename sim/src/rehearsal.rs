@@ -22,6 +22,7 @@ use quietpath_bridge::replan::worker::carry_out;
 use quietpath_bridge::replan::{Answer, Observation};
 
 use crate::autopilot::{self, Machine};
+use crate::wiretap::{Direction, Wiretap};
 
 /// Longest that planning may really take.
 const DEADLINE: Duration = Duration::from_secs(120);
@@ -140,6 +141,7 @@ pub struct Rehearsal {
     began: Option<Time>,
     start_time: f64,
     recorder: Option<Recorder>,
+    wire: Wiretap,
     events: Vec<Event>,
     end: Option<End>,
 }
@@ -170,6 +172,7 @@ impl Rehearsal {
             began: None,
             start_time,
             recorder: None,
+            wire: Wiretap::default(),
             events: Vec::new(),
             end: None,
         })
@@ -192,6 +195,7 @@ impl Rehearsal {
                 if let Some(recorder) = &mut self.recorder {
                     recorder.frame(self.now, &frame.bytes);
                 }
+                self.wire.hear(self.now, Direction::Down, &frame.message);
                 self.feed(Input::Frame(Box::new(frame)));
             }
         }
@@ -234,6 +238,7 @@ impl Rehearsal {
         for output in outputs {
             match output {
                 Output::Send(message) => {
+                    self.wire.hear(self.now, Direction::Up, &message);
                     let bytes = self.ours.encode(self.now, &message);
                     if let Some(recorder) = &mut self.recorder {
                         recorder.frame(self.now, &codec::plain_bytes(self.ours.identity(), &message));
@@ -282,6 +287,18 @@ impl Rehearsal {
     #[must_use]
     pub const fn endpoint(&self) -> &Endpoint {
         &self.ours
+    }
+
+    /// What went over the wire.
+    #[must_use]
+    pub const fn wire(&self) -> &Wiretap {
+        &self.wire
+    }
+
+    /// When the plan began to be flown.
+    #[must_use]
+    pub const fn began(&self) -> Option<Time> {
+        self.began
     }
 
     /// Time of the scenario since the plan is flown, s; `None` before.

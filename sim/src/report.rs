@@ -95,7 +95,11 @@ pub fn obstacle(scenario: &ScenarioFile, obstacle: &Obstacle) -> String {
     format!("\n{BAD}no feasible plan{BAD:#}: {found}\n  help: {help}\n")
 }
 
-fn agent_rows(scenario: &ScenarioFile, assessment: &Assessment, agent: &AgentSeries) -> Vec<(&'static str, String)> {
+pub(crate) fn agent_rows(
+    scenario: &ScenarioFile,
+    assessment: &Assessment,
+    agent: &AgentSeries,
+) -> Vec<(&'static str, String)> {
     let mut rows = vec![("path length", units::length(agent.length * scenario.frame.unit_m))];
     if let Some(values) = agent.metric(Metric::Detection) {
         let (peak, node) = extreme(values, f64::max);
@@ -155,12 +159,12 @@ fn violation(assessment: &Assessment) -> String {
 }
 
 /// A span of time with a unit that suits it.
-fn span(seconds: f64) -> String {
+pub(crate) fn span(seconds: f64) -> String {
     if seconds < 1.0 { format!("{:.1} ms", 1e3 * seconds) } else { format!("{seconds:.2} s") }
 }
 
 /// A number with so many significant digits, without trailing zeros.
-fn trimmed_to(value: f64, digits: i32) -> String {
+pub(crate) fn trimmed_to(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
@@ -252,6 +256,16 @@ fn figures(scenario: &ScenarioFile, plan: &PlanFile, assessment: &Assessment) ->
         }
     }
     rows
+}
+
+/// Which constraints a flight kept: a vehicle flies a hair beside its plan.
+#[must_use]
+pub fn kept(assessment: &Assessment) -> String {
+    let broken: Vec<String> = (assessment.violations.iter())
+        .filter(|(_, size)| *size > TOLERANCE)
+        .map(|(name, size)| format!("{} (by {:.2} %)", name.replace('_', " "), 100.0 * size))
+        .collect();
+    if broken.is_empty() { "all kept".into() } else { format!("all kept but {}", broken.join(", ")) }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use std::process::{Command, Output, Stdio};
 
 use tempfile::TempDir;
 
-const COMMANDS: [&str; 6] = ["plan", "trade", "landscape", "check", "new", "completions"];
+const COMMANDS: [&str; 11] =
+    ["plan", "trade", "landscape", "check", "report", "study", "merge", "import", "schema", "new", "completions"];
 const METRICS: [&str; 10] =
     ["detection", "false_alarm", "cep2", "cep", "aee", "gdop", "log_cep2", "log_cep", "log_aee", "log_gdop"];
 
@@ -107,15 +108,17 @@ fn the_examples_of_the_help_run_in_order() {
 }
 
 #[test]
-fn without_arguments_the_built_in_scenario_is_planned_into_out() {
+fn a_plan_leaves_its_files_and_a_summary() {
     let room = Room::new();
-    let said = room.expect(0, &[]);
+    fs::write(room.path("scenario.toml"), scenario("square8-detection")).unwrap();
+    let said = room.expect(0, &["plan", "scenario.toml", "--out", "out"]);
     for name in [
         "landscape.png",
         "landscape.svg",
         "series.png",
         "series.svg",
         "plan.json",
+        "report.html",
         "path.geojson",
         "mission.plan",
         "mission.waypoints",
@@ -135,7 +138,6 @@ fn without_arguments_the_built_in_scenario_is_planned_into_out() {
     for label in ["smallest location error", "worst violation", "planning time"] {
         assert!(said.lines().any(|line| line.starts_with(label)), "{label} is missing in\n{said}");
     }
-    fs::write(room.path("scenario.toml"), scenario("square8-detection")).unwrap();
     let checked = room.expect(0, &["check", "scenario.toml", "out/plan.json"]);
     assert!(checked.contains("(as the plan claims)") && checked.trim_end().ends_with("feasible"), "{checked}");
 }

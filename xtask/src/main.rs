@@ -17,6 +17,12 @@ use clap::{Parser, Subcommand};
 use firmware::Table;
 use step::Step;
 
+/// The scenario whose report is shown on the pages.
+const REPORT: &str = "wight-jam";
+/// Pictures of the report: name, width and height, instant in seconds, and whether in the dark.
+const SCREENS: [(&str, &str, &str, bool); 2] =
+    [("report-1280", "1280,1500", "5400", false), ("report-390-dark", "390,1500", "5400", true)];
+
 /// Scenarios whose landscape, with the path through it, is shown on the pages.
 const PICTURES: [&str; 2] = ["square8-detection", "square8-aee"];
 
@@ -50,7 +56,7 @@ enum Command {
     },
     /// What continuous integration runs: check, then test
     Ci,
-    /// The pictures of the README, drawn anew by the program
+    /// The pictures of the pages, drawn anew by the program; those of the report need chromium
     Pictures,
     /// The page of all figures of the paper, planned and drawn anew
     Gallery,
@@ -129,12 +135,25 @@ fn check() -> Vec<Step> {
 
 fn test() -> Vec<Step> {
     let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
-    vec![
-        Step::cargo("tests", "test --workspace"),
-        Step::cargo("other people's MAVLink", interoperate),
-        Step::cargo("the firmware under QEMU", "xtask target"),
-        Step::cargo("sizes of the firmware", "xtask sizes --compare"),
-    ]
+    let browser = "test --package quietpath-sim --test page -- --ignored";
+    let mut steps =
+        vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
+    steps.extend(chromium());
+    steps.push(Step::cargo("the report in a browser", browser));
+    steps.push(Step::cargo("the firmware under QEMU", "xtask target"));
+    steps.push(Step::cargo("sizes of the firmware", "xtask sizes --compare"));
+    steps
+}
+
+/// Chromium, from the system's packages where it is missing; elsewhere the tests say what they need.
+fn chromium() -> Vec<Step> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let has = |program: &str| std::env::split_paths(&path).any(|folder| folder.join(program).is_file());
+    if has("chromium") || !has("apt-get") {
+        return Vec::new();
+    }
+    let install = "install -qq -y --no-install-recommends chromium";
+    vec![Step::new("packages listed", "apt-get", "update -qq"), Step::new("chromium installed", "apt-get", install)]
 }
 
 fn bench(arguments: &[String]) -> Step {
@@ -147,15 +166,35 @@ fn pictures() -> Vec<Step> {
         let arguments = format!("run --release -- plan sim/scenarios/{name}.toml --out target/pictures/{name}");
         Step::cargo(name, &arguments)
     };
-    PICTURES.into_iter().map(plan).collect()
+    let study = "run --release -- study sim/scenarios/square8-detection.toml --out target/pictures/study";
+    let report = format!("run --release -- fly sim/scenarios/{REPORT}.toml --out target/pictures/{REPORT}");
+    let mut steps: Vec<Step> = PICTURES.into_iter().map(plan).collect();
+    steps.push(Step::cargo("study", study));
+    steps.push(Step::cargo("report", &report));
+    steps.extend(SCREENS.map(|(name, size, instant, dark)| screen(name, size, instant, dark)));
+    steps
+}
+
+/// The report in headless Chromium, into a picture.
+fn screen(name: &'static str, size: &str, instant: &str, dark: bool) -> Step {
+    let top = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/pictures");
+    let scheme =
+        if dark { "--blink-settings=preferredColorScheme=0" } else { "--blink-settings=preferredColorScheme=1" };
+    let options = "--headless --no-sandbox --disable-gpu --no-first-run --hide-scrollbars --virtual-time-budget=8000";
+    let quiet = "--disable-quic --disable-background-networking --disable-component-update --disable-sync";
+    let files = format!("--user-data-dir={top}/browser --screenshot={top}/{name}.png --window-size={size}");
+    let page = format!("file://{top}/{REPORT}/report.html#t={instant}");
+    Step::new(name, "chromium", &format!("{options} {quiet} {scheme} {files} {page}"))
 }
 
 /// Copies the pictures to where the pages look for them.
 fn hang(top: &Path) -> anyhow::Result<()> {
     let wall = top.join("docs/pictures");
     std::fs::create_dir_all(&wall).with_context(|| format!("cannot make {}", wall.display()))?;
-    for name in PICTURES {
-        let picture = top.join("target/pictures").join(name).join("landscape.png");
+    let landscapes = PICTURES.map(|name| (format!("{name}/landscape.png"), name));
+    let screens = SCREENS.map(|(name, ..)| (format!("{name}.png"), name));
+    for (picture, name) in landscapes.into_iter().chain(screens).chain([("study/study.png".to_owned(), "study")]) {
+        let picture = top.join("target/pictures").join(picture);
         let place = wall.join(name).with_extension("png");
         std::fs::copy(&picture, &place).with_context(|| format!("cannot copy {}", picture.display()))?;
         println!("{}", place.display());

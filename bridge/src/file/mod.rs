@@ -8,6 +8,7 @@ pub mod mission;
 pub mod plan;
 mod reader;
 pub mod scenario;
+pub mod schema;
 
 pub use error::{FileError, Place, Warning};
 pub use plan::PlanFile;

@@ -2,6 +2,7 @@
 
 use crate::clock::Time;
 use crate::command::Command;
+use crate::file::{PlanFile, ScenarioFile};
 use crate::mission::{Delivery, List, Watch};
 use crate::replan::Answer;
 use crate::replan::job::{Rejected, budgets_at, joined, judge, rest, rest_at};
@@ -22,6 +23,18 @@ const ARRIVE_MAX: f64 = 30.0;
 const BEHIND: usize = 2;
 
 impl Flight {
+    /// The plan that flies, or is about to.
+    #[must_use]
+    pub const fn plan(&self) -> &PlanFile {
+        &self.flying.plan
+    }
+
+    /// The scenario as the bridge knows it now.
+    #[must_use]
+    pub const fn world(&self) -> &ScenarioFile {
+        &self.world
+    }
+
     pub(super) fn fly(&mut self, vehicle: &Vehicle) {
         if self.telemetry.is_lost(self.now) {
             // Nothing is steered blindly. The autopilot has its own answer to a bridge that it does not hear.

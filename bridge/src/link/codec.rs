@@ -156,6 +156,12 @@ pub(super) fn plain(from: Identity, sequence: u8, message: &MavMessage) -> MAVLi
     raw
 }
 
+/// The name of a message, as the protocol writes it.
+#[must_use]
+pub fn name(message: &MavMessage) -> &'static str {
+    message.message_name()
+}
+
 /// The bytes of a message as an unsigned frame with sequence number 0.
 #[must_use]
 pub fn plain_bytes(from: Identity, message: &MavMessage) -> Vec<u8> {

@@ -49,7 +49,49 @@ pub fn landscape(scenario: &ScenarioFile, view: &View) -> Result<Grid, Box<FileE
     })
 }
 
+/// Every metric that the sensors give at the centres of cells that tile the domain, in the order of [`Metric::ALL`]; the
+/// view's own metric is not asked.
+///
+/// # Errors
+/// As the scenario's conversion to the core; a checked scenario has none.
+pub fn landscapes(scenario: &ScenarioFile, view: &View) -> Result<Vec<Grid>, Box<FileError>> {
+    super::on_large_stack(|| match scenario.dimension {
+        3 => swept::<3>(scenario, view, &Metric::ALL),
+        _ => swept::<2>(scenario, view, &Metric::ALL),
+    })
+}
+
+/// Probability that the sensors detect an agent without controls at a position, length units, at a time, s.
+///
+/// # Errors
+/// As the scenario's conversion to the core; a checked scenario has none.
+pub fn detection_at(scenario: &ScenarioFile, time: f64, position: &[f64]) -> Result<f64, Box<FileError>> {
+    super::on_large_stack(|| match scenario.dimension {
+        3 => detection_in::<3>(scenario, time, position),
+        _ => detection_in::<2>(scenario, time, position),
+    })
+}
+
+fn detection_in<const DIM: usize>(
+    scenario: &ScenarioFile,
+    time: f64,
+    position: &[f64],
+) -> Result<f64, Box<FileError>> {
+    let problem = scenario.to_core::<f64, DIM>()?;
+    Ok(point_values(&problem.view(), time, &point::<f64, DIM>(position), &mut super::scratch::<DIM>()).detection)
+}
+
 fn landscape_in<const DIM: usize>(scenario: &ScenarioFile, view: &View) -> Result<Grid, Box<FileError>> {
+    let grid = swept::<DIM>(scenario, view, &[view.metric])?.pop();
+    grid.ok_or_else(|| too_few_ranging(scenario, view.metric))
+}
+
+/// Grids of those of `metrics` that the sensors give.
+fn swept<const DIM: usize>(
+    scenario: &ScenarioFile,
+    view: &View,
+    metrics: &[Metric],
+) -> Result<Vec<Grid>, Box<FileError>> {
     let problem = scenario.to_core::<f64, DIM>()?;
     let start_height = scenario.agents.first().and_then(|agent| agent.start.get(2)).copied();
     let height = if DIM == 3 { view.height.or(start_height) } else { None };
@@ -60,15 +102,19 @@ fn landscape_in<const DIM: usize>(scenario: &ScenarioFile, view: &View) -> Resul
     };
     let (east, north) = (centers(0, view.columns), centers(1, view.rows));
     let mut scratch = super::scratch::<DIM>();
-    let mut values = Vec::with_capacity(east.len() * north.len());
+    let mut found = Vec::with_capacity(east.len() * north.len());
     for y in &north {
         for x in &east {
             let position = point::<f64, DIM>(&[*x, *y, height.unwrap_or_default()]);
-            let found = point_values(&problem.view(), view.time, &position, &mut scratch).get(view.metric);
-            values.push(found.ok_or_else(|| too_few_ranging(scenario, view.metric))?);
+            found.push(point_values(&problem.view(), view.time, &position, &mut scratch));
         }
     }
-    Ok(Grid { metric: view.metric, time: view.time, height, east, north, values })
+    let grid = |metric: &Metric| {
+        let values: Option<Vec<f64>> = found.iter().map(|values| values.get(*metric)).collect();
+        let (metric, time, east, north) = (*metric, view.time, east.clone(), north.clone());
+        values.map(|values| Grid { metric, time, height, east, north, values })
+    };
+    Ok(metrics.iter().filter_map(grid).collect())
 }
 
 fn too_few_ranging(scenario: &ScenarioFile, metric: Metric) -> Box<FileError> {

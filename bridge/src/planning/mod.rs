@@ -6,7 +6,7 @@
 //! | [`roll()`] | a plan in steps, with every step |
 //! | [`improve`] | the same, from an earlier plan |
 //! | [`assess()`] | objective, violations and series of a plan, in double precision, from its written numbers alone |
-//! | [`landscape()`] | a metric over the domain at one time |
+//! | [`landscape()`], [`landscapes`], [`detection_at`] | a metric over the domain at one time, all of them, one at one place |
 //!
 //! The core keeps everything in fixed-size structures of the host's capacities, hundreds of kilobytes each. They
 //! live on the heap, but pass through the stack while they are built, several times over without optimisation. All
@@ -19,7 +19,7 @@ mod roll;
 mod solve;
 
 pub use assess::{AgentSeries, Assessment, assess};
-pub use landscape::{Grid, View, landscape};
+pub use landscape::{Grid, View, detection_at, landscape, landscapes};
 pub use obstacle::Obstacle;
 pub use roll::{Rolled, Step, roll, roll_through};
 pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};

@@ -11,13 +11,15 @@
 //! | N | `intervals` | | |
 //! | | `separation` | scenario length unit | |
 //!
-//! Vehicles are in `agent`, sensors in `sensor`, objective and limits in `term`, regions in `region`; the checks are in
+//! Vehicles are in `agent`, sensors in `sensor`, objective and limits in `term`, regions in `region`, the plain case of each in
+//! `plain`; the checks are in
 //! `validate`.
 //!
 //! Source: sections 2, 3.3 and 4.1. Limits: [`TERMS_MAX`], [`REGIONS_MAX`], [`LIMITS_MAX`], and the
 //! capacities of [`Scenario`].
 
 mod agent;
+mod plain;
 mod region;
 mod sensor;
 mod term;

@@ -194,7 +194,7 @@ where
 {
     let status = projected_gradient::descend(scenario, settings, workspace, ledger, deadline);
     let may_refine = !matches!(status, Status::Deadline | Status::Infeasible | Status::NonFinite);
-    if may_refine && settings.refinements > 0 {
+    if may_refine && settings.refinements > 0 && !cfg!(feature = "first-order") {
         return refine::polish(scenario, settings, workspace, ledger, deadline).unwrap_or(status);
     }
     status

@@ -71,7 +71,7 @@ fn format(path: &Path) -> Result<Format, Failure> {
 }
 
 /// A view of the whole domain in square cells, `longer` of them along the longer side.
-pub(super) fn view(scenario: &ScenarioFile, metric: Metric, longer: usize) -> View {
+pub(crate) fn view(scenario: &ScenarioFile, metric: Metric, longer: usize) -> View {
     let side = |axis: usize| {
         let bound = |bounds: &[f64]| bounds.get(axis).copied().unwrap_or_default();
         bound(&scenario.domain.max) - bound(&scenario.domain.min)

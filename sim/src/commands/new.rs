@@ -1,5 +1,6 @@
 //! `quietpath new`: a commented scenario to start from.
 
+use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -19,15 +20,21 @@ pub fn run(args: &NewArgs) -> Result<Verdict, Failure> {
         return Ok(Verdict::Done);
     }
     let shown = args.file.display();
-    let mut options = std::fs::OpenOptions::new();
-    let options = if args.force { options.create(true).truncate(true) } else { options.create_new(true) };
-    let mut file = options.write(true).open(&args.file).map_err(|cause| match cause.kind() {
-        std::io::ErrorKind::AlreadyExists => {
-            Failure::Input(format!("{shown} exists already\n  help: give another name, or --force to overwrite it"))
-        }
-        _ => Failure::write(&args.file, &cause),
-    })?;
+    let mut file = create(&args.file, args.force)?;
     file.write_all(STARTER.as_bytes()).map_err(|cause| Failure::write(&args.file, &cause))?;
     say(Stream::Out, &format!("wrote {shown}\nnext: quietpath plan {shown} --out out\n"))?;
     Ok(Verdict::Done)
+}
+
+/// Makes a file that is not there yet, or with `force` anew.
+pub(super) fn create(path: &Path, force: bool) -> Result<File, Failure> {
+    let mut options = std::fs::OpenOptions::new();
+    let options = if force { options.create(true).truncate(true) } else { options.create_new(true) };
+    options.write(true).open(path).map_err(|cause| match cause.kind() {
+        std::io::ErrorKind::AlreadyExists => {
+            let shown = path.display();
+            Failure::Input(format!("{shown} exists already\n  help: give another name, or --force to overwrite it"))
+        }
+        _ => Failure::write(path, &cause),
+    })
 }

@@ -3,6 +3,7 @@
 //! | file in `--out` | what |
 //! |---|---|
 //! | `plan.json` | the plan |
+//! | `report.html` | all of it as one page that moves |
 //! | `landscape.svg`, `.png` | a metric over the area, the flight on it |
 //! | `series.svg`, `.png` | every figure along the flight |
 //! | `mission.plan`, `mission.waypoints` | for ground stations, one an agent; with latitude and longitude only |
@@ -14,7 +15,7 @@
 //! A plan that is not feasible is drawn and written for people to look at, but not as a mission or map.
 
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use quietpath_bridge::file::mission::{file_name, missions};
 use quietpath_bridge::file::{PlanFile, ScenarioFile, geojson};
@@ -25,12 +26,9 @@ use super::{landscape, load, steps};
 use crate::cli::{MetricArg, PlanArgs, PrecisionArg};
 use crate::illustrate::{self, Flown};
 use crate::outcome::{Failure, Stream, Verdict, say, with_progress, write_file};
+use crate::page::{self, Story, Way};
 use crate::report;
 
-/// The scenario that is planned when nothing is asked.
-pub const BUILT_IN: &str = include_str!("../../scenarios/square8-detection.toml");
-/// Where its files go.
-const BUILT_IN_OUT: &str = "out";
 /// Cells along the longer side of the landscape behind a flight.
 const CELLS: usize = 240;
 
@@ -41,24 +39,6 @@ const CELLS: usize = 240;
 pub fn run(args: &PlanArgs) -> Result<Verdict, Failure> {
     let scenario = load(&args.scenario)?;
     carry_out(&scenario, args)
-}
-
-/// Plans the built-in scenario into the folder `out`.
-///
-/// # Errors
-/// Files that cannot be written.
-pub fn built_in() -> Result<Verdict, Failure> {
-    let scenario = ScenarioFile::parse("built-in scenario", BUILT_IN)?.scenario;
-    let args = PlanArgs {
-        scenario: String::new(),
-        out: Some(PathBuf::from(BUILT_IN_OUT)),
-        plan: None,
-        precision: PrecisionArg::F64,
-        metric: None,
-        once: false,
-    };
-    say(Stream::Out, "Planning the built-in scenario; `quietpath --help` tells what else there is.\n\n")?;
-    carry_out(&scenario, &args)
 }
 
 fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failure> {
@@ -82,7 +62,8 @@ fn carry_out(scenario: &ScenarioFile, args: &PlanArgs) -> Result<Verdict, Failur
         text.push_str(&report::obstacle(scenario, obstacle));
     }
     if let Some(folder) = &args.out {
-        let written = with_progress("drawing", || write_folder(scenario, &made, metric, folder))?;
+        let settings = settings(scenario, args);
+        let written = with_progress("drawing", || write_folder(scenario, &made, metric, &settings, folder))?;
         text.push_str(&list(folder, &written));
     }
     say(summary_to, &text)?;
@@ -118,6 +99,18 @@ fn options(args: &PlanArgs) -> Options {
     Options { precision, rollout, ..Options::default() }
 }
 
+/// What a report says of how the plan was made.
+fn settings(scenario: &ScenarioFile, args: &PlanArgs) -> Vec<(String, String)> {
+    let precision = match args.precision {
+        PrecisionArg::F32 => "32 bits",
+        PrecisionArg::F64 => "64 bits",
+    };
+    let in_steps = scenario.rolling.is_some() && !args.once;
+    let pieces = if in_steps { "steps, as the scenario says" } else { "one piece, every track known" };
+    let row = |name: &str, value: &str| (name.to_owned(), value.to_owned());
+    vec![row("computed with", precision), row("planned in", pieces)]
+}
+
 /// The metric behind the flight: asked for, or that of the first term of the objective.
 pub(super) fn background(scenario: &ScenarioFile, asked: Option<MetricArg>) -> Result<Metric, Failure> {
     let first = scenario.terms.first().map_or(Metric::Detection, |term| term.metric);
@@ -139,7 +132,13 @@ struct Written {
     skipped: Option<String>,
 }
 
-fn write_folder(scenario: &ScenarioFile, made: &Made, metric: Metric, folder: &Path) -> Result<Written, Failure> {
+fn write_folder(
+    scenario: &ScenarioFile,
+    made: &Made,
+    metric: Metric,
+    settings: &[(String, String)],
+    folder: &Path,
+) -> Result<Written, Failure> {
     let flown = Flown { plan: &made.plan, assessment: &made.assessment, steps: &made.steps };
     let mut files = Vec::new();
     let mut put = |name: String, bytes: &[u8]| -> Result<(), Failure> {
@@ -148,6 +147,11 @@ fn write_folder(scenario: &ScenarioFile, made: &Made, metric: Metric, folder: &P
         Ok(())
     };
     put("plan.json".into(), flown.plan.to_json().as_bytes())?;
+    let (plan, assessment, background) = (flown.plan, flown.assessment, metric);
+    let steps: Vec<PlanFile> = made.steps.iter().map(|step| step.plan.clone()).collect();
+    let way = Way::Planned;
+    let story = Story { plan, way, assessment, steps: &steps, wire: &[], background, settings };
+    put("report.html".into(), page::html(scenario, &story)?.as_bytes())?;
     let grid = planning::landscape(scenario, &landscape::view(scenario, metric, CELLS))?;
     let pictures = [
         ("landscape", illustrate::landscape(scenario, &grid, Some(flown.plan)).map_err(Failure::input)?),

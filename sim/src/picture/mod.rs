@@ -1,6 +1,6 @@
 //! Pictures: composed as SVG, and rasterised from that same SVG, so that the two never differ.
 //!
-//! The drawings take plain structures ([`Grid`], [`landscape::Scene`], [`series::Sheet`], [`curves::Sheet`]) in the units that are
+//! The drawings take plain structures ([`Grid`], [`landscape::Scene`], [`series::Sheet`], [`curves::Sheet`], [`distribution::Sheet`]) in the units that are
 //! printed on them, and know nothing of scenarios.
 //!
 //! Limits: text is set in DejaVu Sans, which the program carries; a viewer of the SVG falls back to its own
@@ -10,6 +10,7 @@ mod canvas;
 pub mod chart;
 pub mod colour;
 pub mod curves;
+pub mod distribution;
 mod font;
 pub mod landscape;
 mod marks;

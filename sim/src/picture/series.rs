@@ -153,7 +153,8 @@ fn draw_panel(canvas: &mut Canvas, area: Area, panel: &Panel, sheet: &Sheet, num
 }
 
 /// The scale that shows a panel's values and bounds.
-fn value_scale(panel: &Panel) -> Scale {
+#[must_use]
+pub fn value_scale(panel: &Panel) -> Scale {
     let values = panel.lines.iter().flat_map(|line| line.points.iter().map(|[_, value]| *value));
     Scale::covering(values.chain(panel.bounds.iter().map(|bound| bound.value)), panel.kind)
 }

@@ -18,6 +18,8 @@ const EXAMPLES: &str = "capi/examples";
 /// The package, and its static library.
 const PACKAGE: &str = "quietpath-capi";
 const LIBRARY: &str = "libquietpath_capi.a";
+/// The planner that is the same on all of them.
+const SMALLER: [&str; 2] = ["--features", "first-order"];
 /// What every C compiler is told.
 const STRICT: [&str; 6] = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-Icapi/include"];
 
@@ -70,7 +72,7 @@ fn summary(said: &str) -> String {
 }
 
 fn on_host(top: &Path, out: &Path) -> anyhow::Result<String> {
-    image::build_library(PACKAGE, &[], top)?;
+    image::build_library(PACKAGE, &SMALLER, top)?;
     let program = out.join("fly");
     let library = top.join(image::ARTIFACTS).join("debug").join(LIBRARY);
     let sources = [source("fly.c"), source("port_host.c"), library];
@@ -83,7 +85,7 @@ fn on_host(top: &Path, out: &Path) -> anyhow::Result<String> {
 }
 
 fn for_target(top: &Path, out: &Path) -> anyhow::Result<PathBuf> {
-    image::build_library(PACKAGE, &["--target", TARGET, "--profile", "small"], top)?;
+    image::build_library(PACKAGE, &[&SMALLER[..], &["--target", TARGET, "--profile", "small"]].concat(), top)?;
     let program = out.join("fly.elf");
     let library = top.join(image::ARTIFACTS).join(TARGET).join("small").join(LIBRARY);
     let sources = [source("fly.c"), source("port_mps2.c"), library];

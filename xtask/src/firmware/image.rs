@@ -63,14 +63,16 @@ pub fn build_library(package: &str, arguments: &[&str], top: &Path) -> anyhow::R
     Ok(())
 }
 
-/// Runs the built-in flight on the host; the lines that it prints.
+/// Runs the built-in flight on the host, with a part's planner; the lines that it prints.
 ///
 /// # Errors
 /// A program that does not build or fails.
-pub fn on_host(top: &Path) -> anyhow::Result<Vec<String>> {
+pub fn on_host(part: &Part, top: &Path) -> anyhow::Result<Vec<String>> {
     let arguments =
         ["run", "--manifest-path", MANIFEST, "--quiet", "--package", "quietpath-flight", "--example", "host"];
-    let ran = cargo(top).args(arguments).stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    let planner = ["--features", part.planner];
+    let ran =
+        cargo(top).args(arguments).args(planner).stderr(Stdio::inherit()).output().context("cannot start cargo")?;
     if !ran.status.success() {
         bail!("the flight on the host fails");
     }

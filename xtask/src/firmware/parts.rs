@@ -10,6 +10,8 @@ pub struct Part {
     /// Cargo's profile, and the feature that chooses the part's memory.
     pub profile: &'static str,
     pub features: &'static str,
+    /// The feature that chooses the same planner on the host.
+    pub planner: &'static str,
     /// Whether the budget of instructions is this part's.
     pub is_timed: bool,
     /// Most bytes of flash and of RAM that the built-in flight may take.
@@ -27,6 +29,7 @@ pub const PARTS: [Part; 2] = [
         processor: "cortex-m7",
         profile: "release",
         features: "",
+        planner: "",
         is_timed: true,
         flash_max: 2048 * KIB,
         ram_max: 72 * KIB,
@@ -37,9 +40,9 @@ pub const PARTS: [Part; 2] = [
         processor: "cortex-m4",
         profile: "small",
         features: "m4f",
+        planner: "first-order",
         is_timed: false,
-        // The aim is 128 KiB; see firmware/README.md for what takes the rest.
-        flash_max: 200 * KIB,
+        flash_max: 128 * KIB,
         ram_max: 64 * KIB,
     },
 ];

@@ -29,6 +29,7 @@
 //! | `[[limit]]` | | none |
 //! | `[rolling]` `steps`, or `adaptive` `shortest`, `longest`, `change` | | in one piece; one of them |
 //! | `[rolling]` `reveal` | `current`, `predicted`, `known` | `current` |
+//! | `[study]` `sensor_position`, `path_loss`, `wind` and their kin | length, , length/s | nothing varies |
 //!
 //! A polygon is a list of 3 to [`quietpath_core::scenario::VERTICES_MAX`] corners in order, in either direction, and
 //! strictly convex. Limits: [`crate::capacity`].
@@ -36,10 +37,12 @@
 mod convert;
 mod explain;
 mod read;
+mod study;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use convert::point;
+pub use study::{Study, Wind};
 
 use quietpath_core::horizon::{Cadence, Reveal};
 use quietpath_core::scenario::{
@@ -234,6 +237,8 @@ pub struct ScenarioFile {
     pub limits: Vec<Limit<f64>>,
     /// A plan made in steps.
     pub rolling: Option<Rolling>,
+    /// What varies when the plan is flown many times.
+    pub study: Option<Study>,
 }
 
 /// A scenario, and what is odd about it.

@@ -9,6 +9,7 @@ use quietpath_core::scenario::{
     Sense, Side, Susceptibility, Term, Timing, Window,
 };
 
+use super::study::study;
 use super::{
     AgentEntry, Bounds, FrameSpec, KnotEntry, Loaded, MotionEntry, Origin, Outline, RegionEntry, Rolling,
     ScenarioFile, SensorEntry,
@@ -18,7 +19,7 @@ use crate::file::FileError;
 use crate::file::error::suggestion;
 use crate::file::reader::{Outcome, Source, Table, Value};
 
-const TOP: &[&str] = &[
+pub(super) const TOP: &[&str] = &[
     "name",
     "dimension",
     "softening",
@@ -36,12 +37,13 @@ const TOP: &[&str] = &[
     "region",
     "limit",
     "rolling",
+    "study",
 ];
-const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
-const AGENT: &[&str] =
+pub(super) const JAMMER: &[&str] = &["pattern", "beam_width", "budget", "detection_model", "q", "live"];
+pub(super) const AGENT: &[&str] =
     &["name", "start", "goal", "start_velocity", "speed_max", "accel_max", "weight", "jammer", "dropout"];
-const SENSOR: &[&str] = &["name", "position", "track", "ranging", "detection", "jam"];
-const TERM: &[&str] = &["metric", "sense", "reduce", "weight", "agents", "from", "until"];
+pub(super) const SENSOR: &[&str] = &["name", "position", "track", "ranging", "detection", "jam"];
+pub(super) const TERM: &[&str] = &["metric", "sense", "reduce", "weight", "agents", "from", "until"];
 
 impl ScenarioFile {
     /// Reads a scenario file; `-` is standard input.
@@ -95,6 +97,7 @@ fn scenario(source: &Source) -> Outcome<ScenarioFile> {
         regions: regions(&top)?,
         limits: limits(&top)?,
         rolling: rolling(&top, intervals)?,
+        study: study(&top)?,
     })
 }
 
@@ -104,7 +107,7 @@ fn section<'a>(top: &Table<'a>, key: &str, keys: &'static [&'static str], exampl
     top.table(key, keys)?.ok_or_else(|| top.error(key, "is missing", help))
 }
 
-fn positive_optional(table: &Table<'_>, key: &str) -> Outcome<Option<f64>> {
+pub(super) fn positive_optional(table: &Table<'_>, key: &str) -> Outcome<Option<f64>> {
     match table.number_optional(key)? {
         Some(value) if value <= 0.0 => {
             Err(table.error(key, format!("must be greater than 0, not {value}"), "give a positive number"))

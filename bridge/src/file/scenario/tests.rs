@@ -513,3 +513,48 @@ fn regions_of_every_kind_reach_the_core() {
     assert_eq!(says(Constraint::Region, Some(1)), "region[1] (region2) is left by uav1 at node 37");
     assert_eq!(says(Constraint::Speed, None), "speed is broken by uav1 at node 37");
 }
+
+/// The properties of an object in a JSON Schema, its references followed.
+fn properties<'a>(schema: &'a serde_json::Value, of: &'a serde_json::Value) -> Vec<&'a str> {
+    let target = of["$ref"].as_str().and_then(|path| schema.pointer(path.trim_start_matches('#'))).unwrap_or(of);
+    let mut names: Vec<&str> =
+        target["properties"].as_object().expect("an object").keys().map(String::as_str).collect();
+    names.sort_unstable();
+    names
+}
+
+#[test]
+fn the_schema_knows_the_keys_that_the_reader_knows() {
+    let text = crate::file::schema::scenario_schema();
+    let schema: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let same = |found: Vec<&str>, known: &[&str]| {
+        let mut known = known.to_vec();
+        known.sort_unstable();
+        assert_eq!(found, known);
+    };
+    let definition = |name: &str| properties(&schema, &schema["$defs"][name]);
+    same(properties(&schema, &schema), super::read::TOP);
+    same(definition("Agent"), super::read::AGENT);
+    same(definition("Jammer"), super::read::JAMMER);
+    same(definition("Sensor"), super::read::SENSOR);
+    same(definition("Term"), super::read::TERM);
+    same(definition("Study"), super::study::KEYS);
+    same(definition("Wind"), super::study::WIND);
+}
+
+#[test]
+fn every_scenario_here_is_one_by_the_schema_too() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/scenarios");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(folder).expect("scenarios") {
+        let path = entry.expect("an entry").path();
+        let text = std::fs::read_to_string(&path).expect("text");
+        let read: Result<crate::file::schema::Scenario, _> = toml::from_str(&text);
+        assert!(read.is_ok(), "{}: {read:?}", path.display());
+        seen += 1;
+    }
+    assert!(seen > 20, "{seen} scenarios");
+    let spoilt = GOOD.replace("speed_max", "speed_maximum");
+    let read: Result<crate::file::schema::Scenario, _> = toml::from_str(&spoilt);
+    assert!(read.expect_err("a key that nobody knows").to_string().contains("speed_maximum"));
+}

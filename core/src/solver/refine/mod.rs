@@ -58,16 +58,22 @@ pub(super) const HALVINGS_MAX: usize = 25;
 /// Multipliers stay within this factor of mu / g.
 const MULTIPLIER_RANGE: f64 = 1e8;
 
+/// One for each agent; none where nothing is refined.
+#[cfg(not(feature = "first-order"))]
+type Each<V, const AGENTS: usize> = [V; AGENTS];
+#[cfg(feature = "first-order")]
+type Each<V, const AGENTS: usize> = [V; 0];
+
 /// Memory of a refinement.
 #[derive(Clone, Debug)]
 pub(super) struct Refinement<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
-    systems: [System<T, DIM, NODES>; AGENTS],
-    multipliers: [Multipliers<T, DIM, NODES>; AGENTS],
+    systems: Each<System<T, DIM, NODES>, AGENTS>,
+    multipliers: Each<Multipliers<T, DIM, NODES>, AGENTS>,
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Refinement<T, DIM, NODES, AGENTS> {
     pub(super) const fn empty() -> Self {
-        Self { systems: [const { System::empty() }; AGENTS], multipliers: [const { Multipliers::zeros() }; AGENTS] }
+        Self { systems: [const { System::empty() }; _], multipliers: [const { Multipliers::zeros() }; _] }
     }
 }
 

@@ -1,0 +1,30 @@
+//! `quietpath view`: a flight of the bridge, in a browser while it goes on.
+
+use std::time::Instant;
+
+use super::plan::background;
+use crate::cli::ViewArgs;
+use crate::fly;
+use crate::outcome::{Failure, Stream, Verdict, say};
+use crate::view::{EVERY, Server, shown};
+
+/// Shows a flight until a signal ends it.
+///
+/// # Errors
+/// A file that is no record, a port that is taken.
+pub fn run(args: &ViewArgs) -> Result<Verdict, Failure> {
+    let server = Server::start(args.port)?;
+    say(Stream::Err, &format!("the flight as it goes on: http://{}/ (Ctrl-C ends it)\n", server.address()))?;
+    let mut last: Option<Instant> = None;
+    fly::follow(&args.record, |look| {
+        if last.is_some_and(|last| last.elapsed() < EVERY) && look.end.is_none() {
+            return Ok(());
+        }
+        if let Some(page) = shown(look, background(look.world, args.metric)?)? {
+            last = Some(Instant::now());
+            server.show(page);
+        }
+        Ok(())
+    })?;
+    Ok(Verdict::Done)
+}
