@@ -167,6 +167,17 @@ pub fn progress_bar(what: &'static str) -> ProgressBar {
     bar
 }
 
+/// A bar above a line that says where a flight stands; nothing in a pipe.
+#[must_use]
+pub fn flight_bar(what: &'static str, parts: u64) -> ProgressBar {
+    let bar = progress_bar(what);
+    bar.set_length(parts);
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {wide_bar} {percent} % {elapsed}\n  {wide_msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
 /// A bar with the time that is left, for many equal parts of a task; nothing in a pipe.
 #[must_use]
 pub fn counting_bar(what: &'static str, parts: u64) -> ProgressBar {

@@ -83,6 +83,27 @@ fn took(words: &str) -> &str {
     words.lines().find(|line| line.starts_with("took")).unwrap()
 }
 
+#[test]
+fn a_team_flies_one_after_the_other_and_is_shown_together() {
+    let room = TempDir::new().unwrap();
+    flown(&room, &["fly", &scenario("square8-team"), "--out", "."]);
+    let track = std::fs::read_to_string(room.path().join("flown.json")).unwrap();
+    let track: serde_json::Value = serde_json::from_str(&track).unwrap();
+    let agents = track["agents"].as_array().unwrap();
+    assert_eq!(agents.len(), 2);
+    let plan = std::fs::read_to_string(room.path().join("plan.json")).unwrap();
+    let plan: serde_json::Value = serde_json::from_str(&plan).unwrap();
+    for (flown, planned) in agents.iter().zip(plan["agents"].as_array().unwrap()) {
+        let last = |agent: &serde_json::Value| agent["path"].as_array().unwrap().last().unwrap().clone();
+        let (flown, planned) = (last(flown), last(planned));
+        let off = |axis: usize| flown[axis].as_f64().unwrap() - planned[axis].as_f64().unwrap();
+        // A length unit is 100 m: both are at their goals, and neither is where it was only planned to be.
+        assert!((1e-9..0.05).contains(&off(0).hypot(off(1))), "{flown} {planned}");
+    }
+    let log = std::fs::read_to_string(room.path().join("flight.log")).unwrap();
+    assert!(log.contains("uav1: flying the plan") && log.contains("uav2: flying the plan"), "{log}");
+}
+
 fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([format!("-{name}"), child.id().to_string()]).status().unwrap().success());
 }

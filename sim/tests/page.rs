@@ -228,6 +228,21 @@ fn fetched(host: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
+/// The last instants that a live page was loaded with and shows after so many seconds, s of the scenario.
+fn looked_at(folder: &Path, host: &str, seconds: u32) -> [f64; 2] {
+    let mut browser = Command::new("chromium");
+    browser.args(QUIET).args(["--enable-logging=stderr", "--dump-dom"]).arg(format!("--timeout={}", 1000 * seconds));
+    browser.arg(format!("--user-data-dir={}", folder.join("browser").display()));
+    let output = browser.arg(format!("http://{host}/")).stdin(Stdio::null()).output().unwrap();
+    let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let complaints: Vec<&str> = log.lines().filter(|line| line.contains(":CONSOLE")).collect();
+    assert!(complaints.is_empty(), "{complaints:#?}");
+    let between = |from: &str, to: &str| dom.split_once(from).and_then(|(_, rest)| Some(rest.split_once(to)?.0));
+    let loaded: Value = serde_json::from_str(between("data-live=\"/events\">", "</script>").expect("data")).unwrap();
+    let words = between("<output id=\"now\" for=\"slider\">", "</output>").expect("the time");
+    [loaded["time"][1].as_f64().unwrap(), words.split_whitespace().next().unwrap().parse().unwrap()]
+}
+
 /// The live page, from a flight that goes on.
 #[test]
 #[ignore = "needs chromium"]
@@ -235,7 +250,7 @@ fn a_flight_that_goes_on_moves_in_the_browser() {
     let room = TempDir::new().unwrap();
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/square8-detection.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_quietpath"));
-    command.current_dir(&room).arg("fly").arg(scenario).args(["--speedup", "4", "--view", "--out", "."]);
+    command.current_dir(&room).arg("fly").arg(scenario).args(["--speedup", "2", "--view", "--out", "."]);
     let mut flight = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut line = String::new();
     BufReader::new(flight.stderr.take().unwrap()).read_line(&mut line).unwrap();
@@ -245,21 +260,14 @@ fn a_flight_that_goes_on_moves_in_the_browser() {
     while !fetched(host).contains("data-live") {
         std::thread::sleep(Duration::from_millis(200));
     }
-    let mut browser = Command::new("chromium");
-    browser.args(QUIET).args(["--enable-logging=stderr", "--timeout=6000", "--dump-dom"]);
-    browser.arg(format!("--user-data-dir={}", room.path().join("browser").display()));
-    let output = browser.arg(format!("http://{address}")).stdin(Stdio::null()).output().unwrap();
+    // A busy machine may take as long as that to load the page: then it is looked at for longer.
+    let moved = [6, 12, 24].into_iter().any(|seconds| {
+        let [loaded, shown] = looked_at(room.path(), host, seconds);
+        shown > loaded + 2.0
+    });
     flight.kill().unwrap();
     flight.wait().unwrap();
-    let (dom, log) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    let complaints: Vec<&str> = log.lines().filter(|line| line.contains(":CONSOLE")).collect();
-    assert!(complaints.is_empty(), "{complaints:#?}");
-    let between = |from: &str, to: &str| dom.split_once(from).and_then(|(_, rest)| Some(rest.split_once(to)?.0));
-    let loaded: Value = serde_json::from_str(between("data-live=\"/events\">", "</script>").expect("data")).unwrap();
-    let loaded = loaded["time"][1].as_f64().unwrap();
-    let words = between("<output id=\"now\" for=\"slider\">", "</output>").expect("the time");
-    let shown: f64 = words.split_whitespace().next().unwrap().parse().unwrap();
-    assert!(shown > loaded + 2.0, "loaded at {loaded} s, shows {words}");
+    assert!(moved, "the page shows what it was loaded with");
 }
 
 #[test]

@@ -3,6 +3,8 @@
 
 #![cfg(unix)]
 
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -46,6 +48,32 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
+/// A browser's view of a record that is about to be written, and its address.
+fn view(record: &str) -> (Child, String) {
+    let mut command = Command::new(built("quietpath"));
+    command.args(["view", record]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program runs");
+    let mut line = String::new();
+    let said = child.stderr.as_mut().expect("it speaks");
+    BufReader::new(said).read_line(&mut line).expect("it says where");
+    let address = line.split("http://").nth(1).and_then(|rest| rest.split('/').next()).expect("an address");
+    (child, address.to_owned())
+}
+
+/// The last instants of so many events of a page, s of the scenario.
+fn instants(page: &str, count: usize) -> Vec<f64> {
+    let mut stream = TcpStream::connect(page).expect("it listens");
+    stream.set_read_timeout(Some(PATIENCE)).expect("a time limit");
+    write!(stream, "GET /events HTTP/1.1\r\nHost: {page}\r\n\r\n").expect("it is asked");
+    let lines = BufReader::new(stream).lines().map_while(Result::ok);
+    let events = lines.filter_map(|line| line.strip_prefix("data:").map(str::to_owned)).take(count);
+    let last = |event: String| {
+        let data: serde_json::Value = serde_json::from_str(event.trim()).expect("JSON");
+        data["time"][1].as_f64().expect("an instant")
+    };
+    events.map(last).collect()
+}
+
 #[test]
 fn a_flight_over_udp_is_steered_recorded_and_replayed() {
     let folder = Folder::new();
@@ -56,8 +84,12 @@ fn a_flight_over_udp_is_steered_recorded_and_replayed() {
     );
     let record = folder.path("flight.jsonl");
     let link = format!("udpin:127.0.0.1:{port}");
+    let (looker, page) = view(&record);
     let flight = bridge(&folder, &["--link", &link, "--mode", "guided", "--record", &record]);
+    let seen = instants(&page, 3);
+    assert!(seen.len() == 3 && seen.windows(2).all(|pair| pair[0] < pair[1]), "{seen:?}");
     let output = finish("the bridge", flight);
+    quietpath_tests::programs::end(looker);
     quietpath_tests::programs::end(vehicle);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let track = PathBuf::from(folder.path("track.csv"));

@@ -29,6 +29,12 @@ impl Flight {
         &self.flying.plan
     }
 
+    /// The name of the agent that this vehicle is.
+    #[must_use]
+    pub fn agent(&self) -> &str {
+        &self.agent
+    }
+
     /// The scenario as the bridge knows it now.
     #[must_use]
     pub const fn world(&self) -> &ScenarioFile {

@@ -400,7 +400,12 @@ impl Flight {
     }
 
     fn leave(&mut self, mode: Mode, end: End) {
-        self.say(Level::Warn, format!("leaving for {mode:?}: {end:?}"));
+        match &end {
+            End::Done => self.say(Level::Info, format!("at the goal: leaving for {mode:?}")),
+            End::Released(why) | End::Stopped(why) | End::Failed(why) => {
+                self.say(Level::Warn, format!("leaving for {mode:?}: {why}"));
+            }
+        }
         self.mode_asked = None;
         self.phase = Phase::Leave { mode, end, since: self.now };
     }

@@ -22,9 +22,9 @@ use quietpath_core::scenario::Metric;
 
 use super::{landscape, load, plan::background};
 use crate::cli::{FlyArgs, FlyModeArg, LikeArg};
-use crate::fly::{self, Flown, Manner, Progress, ended};
+use crate::fly::{self, Flown, Look, Manner, Progress, ended};
 use crate::illustrate;
-use crate::outcome::{Failure, Stream, Verdict, progress_bar, say, with_progress, write_file};
+use crate::outcome::{Failure, Stream, Verdict, flight_bar, say, with_progress, write_file};
 use crate::page::{self, Story, Way};
 use crate::report;
 use crate::units;
@@ -34,6 +34,8 @@ use crate::view::{self, Server, shown};
 pub const BUILT_IN: &str = include_str!("../../scenarios/wight-jam.toml");
 /// Where its files go.
 const BUILT_IN_OUT: &str = "out";
+/// Parts of the bar that shows how much is flown.
+const PARTS: u64 = 1000;
 /// Cells along the longer side of the landscape behind a flight.
 const CELLS: usize = 240;
 
@@ -93,16 +95,16 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
         speedup: args.speedup,
         connect: args.connect.clone(),
     };
-    let bar = progress_bar("planning");
+    let bar = flight_bar("planning", PARTS);
     let unit_m = scenario.frame.unit_m;
-    bar.set_style(indicatif::ProgressStyle::default_spinner());
     let server = args.view.map(Server::start).transpose()?;
     if let Some(server) = &server {
         say(Stream::Err, &format!("the flight as it goes on: http://{}/\n", server.address()))?;
     }
     let mut last: Option<Instant> = None;
     let flown = fly::fly(scenario, &manner, |look| {
-        bar.set_message(line(look.progress, unit_m));
+        bar.set_message(words(look.progress, unit_m));
+        bar.set_position(parts(&look));
         let is_due = last.is_none_or(|last| last.elapsed() >= view::EVERY) || look.end.is_some();
         if let Some(server) = server.as_ref().filter(|_| is_due)
             && let Some(page) = shown(look, metric)?
@@ -121,21 +123,27 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
     Ok(Verdict::on(flown.end == End::Done))
 }
 
-/// One line of progress: step, time, position, peak detection, replans, link.
-fn line(progress: &Progress, unit_m: f64) -> String {
-    let time = progress.time.map_or_else(|| "before the start".into(), units::duration);
+/// Progress in a few words: step, time, position, detection, link.
+fn words(progress: &Progress, unit_m: f64) -> String {
+    let who = progress.agent.as_ref().map(|name| format!("{name}, ")).unwrap_or_default();
+    let time = progress.time.map_or_else(|| progress.phase.to_owned(), |time| format!("{time:.0} s"));
     let place: Vec<String> = progress.position.iter().take(2).map(|part| units::length(part * unit_m)).collect();
     format!(
-        "{} | {time} | {} | detection {:.3}, peak {:.3} | {} plans in flight | {} frames out, {} in, {:.1} % lost",
-        progress.phase,
-        place.join(" east, ") + " north",
+        "{who}plan {}, {time}, {} north, detection {:.3}, peak {:.3}, {:.1} % lost",
+        progress.replans + 1,
+        place.join(" east "),
         progress.detection,
         progress.peak,
-        progress.replans,
-        progress.frames[0],
-        progress.frames[1],
         100.0 * progress.loss,
     )
+}
+
+/// Parts of the plan's time that are flown, of [`PARTS`].
+fn parts(look: &Look<'_>) -> u64 {
+    let (Some(time), Some(plan)) = (look.progress.time, look.steps.last()) else { return 0 };
+    let begin = look.steps.first().map_or(plan.start_time, |first| first.start_time);
+    let whole = plan.start_time + plan.duration - begin;
+    ((time - begin) / whole.max(f64::MIN_POSITIVE) * PARTS as f64).clamp(0.0, PARTS as f64) as u64
 }
 
 /// Writes everything; the names of the files.

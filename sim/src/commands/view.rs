@@ -15,6 +15,9 @@ use crate::view::{EVERY, Server, shown};
 pub fn run(args: &ViewArgs) -> Result<Verdict, Failure> {
     let server = Server::start(args.port)?;
     say(Stream::Err, &format!("the flight as it goes on: http://{}/ (Ctrl-C ends it)\n", server.address()))?;
+    if !args.record.exists() {
+        say(Stream::Err, &format!("waiting for {}, which is not there yet\n", args.record.display()))?;
+    }
     let mut last: Option<Instant> = None;
     fly::follow(&args.record, |look| {
         if last.is_some_and(|last| last.elapsed() < EVERY) && look.end.is_none() {

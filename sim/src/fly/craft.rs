@@ -7,6 +7,7 @@ use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::flight::{self, End, Flight, Input, Level, Output};
 use quietpath_bridge::frame::Place;
 use quietpath_bridge::link::{Accept, Address, Endpoint, Event, Identity, Link, Statistics};
+use quietpath_bridge::payload::Emission;
 use quietpath_bridge::replan::{Answer, Observation, Worker};
 
 use crate::outcome::Failure;
@@ -19,6 +20,8 @@ use super::{JAMMER, TRANSMITTER};
 const WAIT: Duration = Duration::from_millis(4);
 /// Longest wait for the clock of a simulation that must not run ahead.
 const NAP_MAX: Duration = Duration::from_millis(100);
+/// Nothing is emitted but what the transmitter always does.
+pub(super) const SILENT: Emission = Emission { level: 0.0, azimuth: 0.0, dropout: 0.0 };
 /// How often payloads are told level 0 at the end: a frame may be lost.
 const SILENCES: usize = 3;
 
@@ -38,8 +41,8 @@ pub(super) trait Craft {
     fn flight(&self) -> &Flight;
     /// Where the vehicle is.
     fn place(&self) -> Option<Place>;
-    /// Jamming level and reduction of the transmit power, 0 to 1.
-    fn levels(&self) -> [f64; 2];
+    /// What payloads emit.
+    fn emission(&self) -> Emission;
     /// Counters of the link.
     fn statistics(&self) -> Statistics;
     /// What went over the wire.
@@ -105,9 +108,15 @@ impl Craft for Simulated {
         Some(self.rehearsal.machine().place())
     }
 
-    fn levels(&self) -> [f64; 2] {
-        let level = |component| self.rehearsal.machine().payload(component).map(|payload| f64::from(payload.level()));
-        [level(JAMMER).unwrap_or(0.0), 1.0 - level(TRANSMITTER).unwrap_or(1.0)]
+    fn emission(&self) -> Emission {
+        let payload = |component| self.rehearsal.machine().payload(component);
+        let level = |component| payload(component).map(|payload| f64::from(payload.level()));
+        let bearing_deg = payload(JAMMER).map_or(0.0, |payload| f64::from(payload.direction_deg()[0]));
+        Emission {
+            level: level(JAMMER).unwrap_or(0.0),
+            azimuth: (90.0 - bearing_deg).to_radians(),
+            dropout: 1.0 - level(TRANSMITTER).unwrap_or(1.0),
+        }
     }
 
     fn statistics(&self) -> Statistics {
@@ -229,8 +238,8 @@ impl Craft for Remote {
         self.flight.vehicle().and_then(|vehicle| vehicle.fix).map(|fix| fix.place)
     }
 
-    fn levels(&self) -> [f64; 2] {
-        self.flight.emission().map_or([0.0; 2], |emission| [emission.level, emission.dropout])
+    fn emission(&self) -> Emission {
+        self.flight.emission().unwrap_or(SILENT)
     }
 
     fn statistics(&self) -> Statistics {

@@ -1,5 +1,7 @@
 //! A flight of another program, followed by the record that it writes.
 
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -8,10 +10,11 @@ use quietpath_bridge::clock::Time;
 use quietpath_bridge::flight::{End, Flight, Input, Level, Output};
 use quietpath_bridge::frame::Place;
 use quietpath_bridge::link::Statistics;
+use quietpath_bridge::payload::Emission;
 use quietpath_bridge::record::Reader;
 use quietpath_bridge::replan::Observation;
 
-use super::craft::Craft;
+use super::craft::{Craft, SILENT};
 use super::watch::Watch;
 use super::{Look, TELL, signals};
 use crate::outcome::Failure;
@@ -22,15 +25,22 @@ const PAUSE: Duration = Duration::from_millis(50);
 /// Lines that are read in one go.
 const LINES_MAX: usize = 4000;
 
-/// Follows the record of a flight until a signal comes; `tell` hears of what is new.
+/// Follows the record of a flight until a signal comes; `tell` hears of what is new. A record that has not begun is waited for.
 ///
 /// # Errors
 /// A file that is no record, a line that cannot be read, what `tell` fails with.
 pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>) -> Result<(), Failure> {
+    let signalled = signals()?;
+    while !has_begun(record) {
+        if signalled.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        std::thread::sleep(PAUSE);
+    }
     let mut craft = Recorded::open(record)?;
     let (scenario, plan) = (craft.reader.scenario().clone(), craft.flight().plan().clone());
-    let mut watch = Watch::new(&scenario, &plan)?;
-    let signalled = signals()?;
+    let agent = scenario.agents.iter().position(|agent| agent.name == craft.flight().agent()).unwrap_or_default();
+    let mut watch = Watch::new(&scenario, &plan, agent)?;
     let mut told: Option<Instant> = None;
     let mut is_news = true;
     while !signalled.load(Ordering::Relaxed) {
@@ -44,13 +54,20 @@ pub fn follow(record: &Path, mut tell: impl FnMut(Look<'_>) -> Result<(), Failur
         }
         if is_news && told.is_none_or(|told| told.elapsed() >= TELL) {
             (told, is_news) = (Some(Instant::now()), false);
-            watch.look_on(&craft, &mut tell)?;
+            watch.look_on(&craft, &[], &mut tell)?;
         }
         if craft.has_caught_up {
             std::thread::sleep(PAUSE);
         }
     }
     Ok(())
+}
+
+/// Whether the first line of a record is complete.
+fn has_begun(record: &Path) -> bool {
+    let mut line = Vec::new();
+    let read = File::open(record).and_then(|file| BufReader::new(file).read_until(b'\n', &mut line));
+    read.is_ok() && line.ends_with(b"\n")
 }
 
 /// A flight as its record tells it.
@@ -117,8 +134,8 @@ impl Craft for Recorded {
         self.flight().vehicle().and_then(|vehicle| vehicle.fix).map(|fix| fix.place)
     }
 
-    fn levels(&self) -> [f64; 2] {
-        self.flight().emission().map_or([0.0; 2], |emission| [emission.level, emission.dropout])
+    fn emission(&self) -> Emission {
+        self.flight().emission().unwrap_or(SILENT)
     }
 
     fn statistics(&self) -> Statistics {

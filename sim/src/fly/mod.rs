@@ -5,8 +5,11 @@
 //! with the faults that were asked for. What comes out is what was flown, and everything about how. An autopilot elsewhere
 //! can take the place of the simulated one; the sensors are the scenario's all the same.
 //!
-//! Limits: the first agent of a scenario flies; wind is calm ([`crate::study`] has it). Nothing is jammed with an autopilot
-//! elsewhere: `quietpath-bridge run --arm-jammer` is for that.
+//! A team flies one agent after the other, each with a vehicle and a link of its own, on the plan that they have: the bridge plans
+//! anew for one agent alone. What was flown is put together by the time of the scenario.
+//!
+//! Limits: wind is calm ([`crate::study`] has it). With an autopilot elsewhere one agent flies, and nothing is jammed:
+//! `quietpath-bridge run --arm-jammer` is for that.
 
 mod craft;
 mod follow;
@@ -16,6 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use quietpath_bridge::file::scenario::AgentEntry;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::flight::settings::{PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{self, End, FlyMode, Level};
@@ -74,6 +78,8 @@ pub struct Manner {
 /// Where a flight stands, for who looks on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
+    /// Who flies, where there are several.
+    pub agent: Option<String>,
     /// Phase of the flight.
     pub phase: &'static str,
     /// Time of the scenario, s; `None` before the plan is flown.
@@ -149,9 +155,8 @@ pub fn first_plan(truth: &ScenarioFile) -> Result<(ScenarioFile, PlanFile), Fail
     Ok((known, planned.plan))
 }
 
-/// How the bridge is told to fly a scenario.
-#[must_use]
-pub fn settings(truth: &ScenarioFile, plan: &PlanFile, manner: &Manner) -> flight::Settings {
+/// How the bridge is told to fly an agent of a scenario.
+fn settings(truth: &ScenarioFile, plan: &PlanFile, agent: &AgentEntry, manner: &Manner) -> flight::Settings {
     let steps = match truth.rolling.map(|rolling| rolling.cadence) {
         Some(Cadence::Even { steps }) => steps,
         // In flight plans come at even times: as often as the shortest step wants it.
@@ -167,17 +172,17 @@ pub fn settings(truth: &ScenarioFile, plan: &PlanFile, manner: &Manner) -> fligh
         ..Replanning::default()
     });
     let entry = |kind, component| PayloadEntry { kind, component, instance: 0, mission_output: None };
-    let first = truth.agents.first();
     let mut payload = Vec::new();
-    if first.is_some_and(|agent| agent.jammer.is_some()) {
+    if agent.jammer.is_some() {
         payload.push(entry(PayloadKind::Jammer, JAMMER));
     }
-    if first.is_some_and(|agent| agent.dropout.is_some()) {
+    if agent.dropout.is_some() {
         payload.push(entry(PayloadKind::Transmitter, TRANSMITTER));
     }
     // A simulated jammer radiates nothing.
     let jammer_armed = manner.connect.is_none();
-    flight::Settings { mode: manner.mode, replan, payload, jammer_armed, ..flight::Settings::default() }
+    let (mode, agent) = (manner.mode, Some(agent.name.clone()));
+    flight::Settings { mode, agent, replan, payload, jammer_armed, ..flight::Settings::default() }
 }
 
 /// The vehicle that flies it.
@@ -186,9 +191,10 @@ fn vehicle(truth: &ScenarioFile, manner: &Manner, flight: &flight::Settings) -> 
         let help = "add latitude_deg, longitude_deg and altitude_m to [frame]";
         Failure::Input(format!("{} does not say where on the Earth it lies\n  help: {help}", truth.file_name()))
     };
-    let mut vehicle = autopilot::Settings::for_agent(manner.like, truth, None).ok_or_else(nowhere)?;
+    let agent = flight.agent.as_deref();
+    let mut vehicle = autopilot::Settings::for_agent(manner.like, truth, agent).ok_or_else(nowhere)?;
     vehicle.pilot = match manner.mode {
-        FlyMode::Guided => Pilot::TakesOff(vehicle.start_height(truth, None).ok_or_else(nowhere)?),
+        FlyMode::Guided => Pilot::TakesOff(vehicle.start_height(truth, agent).ok_or_else(nowhere)?),
         FlyMode::Mission => Pilot::StartsMission,
     };
     vehicle.payloads.extend(flight.payload.iter().map(|entry| {
@@ -201,20 +207,21 @@ fn vehicle(truth: &ScenarioFile, manner: &Manner, flight: &flight::Settings) -> 
     Ok(vehicle)
 }
 
-/// What flies a scenario: an autopilot here or elsewhere, and the bridge.
+/// What flies an agent: an autopilot here or elsewhere, and the bridge.
 fn craft(
     truth: &ScenarioFile,
-    known: ScenarioFile,
+    known: &ScenarioFile,
     plan: &PlanFile,
+    agent: &AgentEntry,
     manner: &Manner,
 ) -> Result<Box<dyn Craft>, Failure> {
-    let settings = settings(truth, plan, manner);
+    let settings = settings(truth, plan, agent, manner);
     if let Some(address) = &manner.connect {
-        let remote = Remote::new(address.clone(), manner.speedup.unwrap_or(1.0), &known, plan, settings)?;
+        let remote = Remote::new(address.clone(), manner.speedup.unwrap_or(1.0), known, plan, settings)?;
         return Ok(Box::new(remote));
     }
     let vehicle = vehicle(truth, manner, &settings)?;
-    let mut setup = Setup::new(known, plan.clone(), settings, vehicle);
+    let mut setup = Setup::new(known.clone(), plan.clone(), settings, vehicle);
     setup.faults = Faults { loss: manner.loss, ..Faults::NONE };
     setup.seed = manner.seed;
     setup.tick = TICK;
@@ -243,11 +250,77 @@ pub fn fly(
     manner: &Manner,
     mut tell: impl FnMut(Look<'_>) -> Result<(), Failure>,
 ) -> Result<Flown, Failure> {
+    if manner.connect.is_some() && truth.agents.len() > 1 {
+        let agents = truth.agents.len();
+        return Err(Failure::Input(format!("--connect flies one agent, and {} has {agents}", truth.file_name())));
+    }
     let (known, plan) = first_plan(truth)?;
-    let mut craft = craft(truth, known, &plan, manner)?;
-    let craft = craft.as_mut();
-    let mut watch = Watch::new(truth, &plan)?;
     let signalled = signals()?;
+    let mut team: Option<Flown> = None;
+    let mut tracks = Vec::new();
+    for (index, agent) in truth.agents.iter().enumerate() {
+        let mut craft = craft(truth, &known, &plan, agent, manner)?;
+        let mut watch = Watch::new(truth, &plan, index)?;
+        let seconds = guide(truth, manner, craft.as_mut(), &mut watch, &tracks, &signalled, &mut tell)?;
+        let zero = truth.start_time - craft.began().map_or(0.0, |began| began.seconds());
+        let (track, mut wire) = (watch.track(&tracks), craft.wire().messages(zero));
+        let end = craft.end().cloned().unwrap_or(End::Done);
+        let Watch { steps, mut log, last, .. } = watch;
+        if truth.agents.len() > 1 {
+            wire.iter_mut().for_each(|message| message.way = format!("{}: {}", agent.name, message.way));
+            log.iter_mut().for_each(|(_, _, text)| *text = format!("{}: {text}", agent.name));
+        }
+        tracks.push(track.clone());
+        let one = Flown { track, steps, wire, log, end, seconds, last };
+        team = Some(team.map_or(one.clone(), |before| before.and(one)));
+        if signalled.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    team.ok_or_else(|| Failure::input("the scenario has no agent"))
+}
+
+impl Flown {
+    /// With what the next agent of the team flew.
+    fn and(mut self, next: Self) -> Self {
+        // The way of who flew longest holds them all.
+        let is_longest = next.track.duration > self.track.duration || next.end != End::Done;
+        if is_longest && next.track.nodes() > 1 {
+            self.track = next.track;
+        } else if next.track.nodes() > 1 {
+            let times = self.track.node_times();
+            for (mine, its) in self.track.agents.iter_mut().zip(&next.track.agents) {
+                if let Some(flown) = watch::sampled(&next.track, &its.name, &times) {
+                    *mine = flown;
+                }
+            }
+        }
+        self.wire.extend(next.wire);
+        self.log.extend(next.log);
+        self.seconds += next.seconds;
+        let (frames, loss) = (self.last.frames, self.last.loss);
+        self.last = Progress { peak: self.last.peak.max(next.last.peak), ..next.last };
+        self.last.loss = self.last.loss.max(loss);
+        for (all, before) in self.last.frames.iter_mut().zip(frames) {
+            *all += before;
+        }
+        if self.end == End::Done {
+            self.end = next.end;
+        }
+        self
+    }
+}
+
+/// Lets a craft fly to its end; how long that really took, s.
+fn guide(
+    truth: &ScenarioFile,
+    manner: &Manner,
+    craft: &mut dyn Craft,
+    watch: &mut Watch<'_>,
+    before: &[PlanFile],
+    signalled: &AtomicBool,
+    tell: &mut impl FnMut(Look<'_>) -> Result<(), Failure>,
+) -> Result<f64, Failure> {
     let begin = Instant::now();
     let mut told = begin;
     let mut look = truth.start_time;
@@ -267,21 +340,12 @@ pub fn fly(
         }
         if told.elapsed() >= TELL {
             told = Instant::now();
-            watch.look_on(craft, &mut tell)?;
+            watch.look_on(craft, before, tell)?;
         }
     }
     watch.finish(craft);
-    watch.look_on(craft, &mut tell)?;
-    let zero = truth.start_time - craft.began().map_or(0.0, |began| began.seconds());
-    Ok(Flown {
-        track: watch.track(),
-        wire: craft.wire().messages(zero),
-        end: craft.end().cloned().unwrap_or(End::Done),
-        seconds: begin.elapsed().as_secs_f64(),
-        steps: watch.steps,
-        log: watch.log,
-        last: watch.last,
-    })
+    watch.look_on(craft, before, tell)?;
+    Ok(begin.elapsed().as_secs_f64())
 }
 
 /// How a flight ended, in words.

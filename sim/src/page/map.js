@@ -183,7 +183,7 @@ class FlightMap {
   size() {
     const { x, y } = this.data.map;
     const width = Math.max(260, this.element.clientWidth);
-    const [left, below] = [66, 56];
+    const [left, below] = [76, 56];
     const height = ((width - left - 20) * (y[1] - y[0])) / (x[1] - x[0]) + below + 12;
     return { width, height: Math.max(160, Math.min(height, 1.5 * width)) };
   }
@@ -191,7 +191,7 @@ class FlightMap {
   build() {
     const theme = colours();
     const axis = (label, side) => ({
-      scale: side === 2 ? 'x' : 'y', side, label: `${label} (${this.data.map.unit})`, labelSize: 24, size: side === 2 ? 32 : 42,
+      scale: side === 2 ? 'x' : 'y', side, label: `${label} (${this.data.map.unit})`, labelSize: 24, size: side === 2 ? 32 : 52,
       stroke: theme.ink, grid: { show: false }, ticks: { stroke: theme.line }, values: (plot, ticks) => ticks.map(mark),
     });
     return new uPlot({

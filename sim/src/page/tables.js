@@ -80,7 +80,7 @@ function legend(data) {
   data.agents.forEach(({ name, colour }, index) => {
     add(`${name}, ${flown ? 'flown' : 'planned'}`, [line('#ffffff', 6, ''), line(colour, 3.2, DASHES[index % DASHES.length].join(' '))]);
   });
-  if (has('step')) add('plan of each step', [line('#ffffff', 4, ''), line(data.agents[0].colour, 1.4, '5 4')]);
+  if (has('step')) add(takeovers(data).length ? 'plan of each step' : 'plan', [line('#ffffff', 4, ''), line(data.agents[0].colour, 1.4, '5 4')]);
   add('start', [['circle', { cx: 17, cy: 9, r: 6, fill: '#ffffff', stroke: data.agents[0].colour, 'stroke-width': 3 }]]);
   add('goal', [['rect', { x: 11, y: 3, width: 12, height: 12, fill: data.agents[0].colour }]]);
   add('sensor', [back, ['circle', { cx: 17, cy: 9, r: 5, fill: '#ffffff', stroke: INK, 'stroke-width': 1.8 }]]);
