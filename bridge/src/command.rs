@@ -151,6 +151,13 @@ impl Commands {
         ticket
     }
 
+    /// The same for a command that says where to be, such as a mode: what was asked of that kind before is no longer meant,
+    /// and is not sent again. An answer to it that is still on its way counts for this one.
+    pub fn supersede(&mut self, now: Time, to: Identity, command: Command) -> u64 {
+        self.pending.retain(|pending| pending.to != to || pending.command.command != command.command);
+        self.submit(now, to, command)
+    }
+
     /// Number of commands that have not ended.
     #[must_use]
     pub fn under_way(&self) -> usize {
@@ -227,6 +234,22 @@ const fn is_for(us: Identity, ack: &COMMAND_ACK_DATA) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mode_that_is_asked_for_no_longer_is_not_sent_again() {
+        let vehicle = Identity { system: 1, component: 1 };
+        let mode = |mode| Command::new(MavCmd::MAV_CMD_DO_SET_MODE, [mode; 7]);
+        let mut commands = Commands::default();
+        for second in 0..20 {
+            commands.supersede(Time::from_millis(second * 1000), vehicle, mode(1.0));
+            commands.poll(Time::from_millis(second * 1000), None, &mut Vec::new());
+        }
+        assert_eq!(commands.under_way(), 1, "nobody answers, and they pile up");
+        commands.supersede(Time::from_millis(20_000), vehicle, mode(2.0));
+        let mut out = Vec::new();
+        commands.poll(Time::from_millis(20_000), None, &mut out);
+        assert!(matches!(out.as_slice(), [MavMessage::COMMAND_LONG(data)] if data.param1 == 2.0), "{out:?}");
+    }
 
     const VEHICLE: Identity = Identity { system: 1, component: 1 };
     const US: Identity = Identity::COMPANION;

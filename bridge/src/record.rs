@@ -12,26 +12,34 @@
 //! `t` is in microseconds. [`replay`] feeds the inputs to a new flight and compares what comes out, text by text: frames
 //! are written unsigned and with sequence number 0, so that every bit of a message counts and the link does not.
 //!
+//! Every line is handed to the operating system as it is written, so a bridge that is killed loses nothing of it; a computer
+//! that loses power may lose what was not on the disk yet. Wherever a record ends, in the middle of a line too, it is
+//! replayed as far as it goes. A record is never written over: where the file is there already, the new one is
+//! `NAME-2`, `NAME-3` and so on. Keys are in neither file, and frames are recorded unsigned or with the signature they came
+//! with, which does not tell the key.
+//!
 //! A `.tlog` holds the frames of both directions, each behind its time in microseconds of Unix time, big-endian; ground
 //! stations read it.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write};
-use std::path::Path;
-use std::time::{Duration, SystemTime};
+use std::io::{self, BufRead, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Time;
 use crate::file::{FileError, PlanFile, ScenarioFile};
-use crate::flight::{Flight, Input, Output, Settings};
+use crate::flight::{Flight, Input, Journal, Output, Settings};
 use crate::link::codec::{Frame, Identity, plain_bytes};
 use crate::replan::{Answer, Observation};
 
 /// Version of the format.
 const VERSION: u32 = 1;
-/// How often the files are flushed.
-const FLUSH: Duration = Duration::from_secs(1);
+/// Longest line, bytes: the first holds the scenario and the plan.
+const LINE_MAX: usize = 64 << 20;
+/// Names that are tried for a record whose own is taken.
+const NAMES_MAX: u32 = 10_000;
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -41,6 +49,9 @@ struct Header {
     scenario_name: String,
     scenario: String,
     plan: PlanFile,
+    /// Where the flight was picked up, if it was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    journal: Option<Journal>,
 }
 
 /// An input as it is written.
@@ -112,6 +123,10 @@ pub fn written(output: &Output) -> String {
         Output::Plan(job) => {
             format!("plan {} from {:?}: {} {:?}", job.number, job.seam, job.tail.to_json(), job.scenario.sensors)
         }
+        Output::Keep(None) => "keep nothing".to_owned(),
+        Output::Keep(Some(journal)) => {
+            format!("keep {}", serde_json::to_string(journal).unwrap_or_else(|error| error.to_string()))
+        }
         Output::Say(level, text) => format!("say {level:?} {text}"),
         Output::End(end) => format!("end {end:?}"),
     }
@@ -119,40 +134,56 @@ pub fn written(output: &Output) -> String {
 
 /// Writes a record and its `.tlog`.
 pub struct Recorder {
+    path: PathBuf,
     lines: BufWriter<File>,
     tlog: BufWriter<File>,
     /// Unix time at the clock's zero, microseconds.
     epoch: u64,
-    flushed: Time,
     has_failed: bool,
 }
 
+/// What a flight began with, and where it was picked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Beginning<'a> {
+    /// The scenario.
+    pub scenario: &'a ScenarioFile,
+    /// The plan.
+    pub plan: &'a PlanFile,
+    /// How to fly.
+    pub settings: &'a Settings,
+    /// Where it was picked up, if it was.
+    pub journal: Option<&'a Journal>,
+}
+
 impl Recorder {
-    /// Begins a record at `path`, and `path` with the extension `tlog`. `now` is the clock's time.
+    /// Begins a record at `path`, and `path` with the extension `tlog`; where either is there already, beside it:
+    /// [`Recorder::path`] says where. `now` is the clock's time.
     ///
     /// # Errors
     /// The files cannot be written.
-    pub fn create(
-        path: &Path,
-        scenario: &ScenarioFile,
-        plan: &PlanFile,
-        settings: &Settings,
-        now: Time,
-    ) -> io::Result<Self> {
-        let mut lines = BufWriter::new(File::create(path)?);
-        let tlog = BufWriter::new(File::create(path.with_extension("tlog"))?);
+    pub fn create(path: &Path, beginning: &Beginning<'_>, now: Time) -> io::Result<Self> {
+        let (path, lines, tlog) = unused(path)?;
+        let (mut lines, tlog) = (BufWriter::new(lines), BufWriter::new(tlog));
         let header = Header {
             quietpath_record: VERSION,
-            settings: settings.clone(),
-            scenario_name: scenario.file_name().to_owned(),
-            scenario: scenario.text().to_owned(),
-            plan: plan.clone(),
+            settings: beginning.settings.clone(),
+            scenario_name: beginning.scenario.file_name().to_owned(),
+            scenario: beginning.scenario.text().to_owned(),
+            plan: beginning.plan.clone(),
+            journal: beginning.journal.cloned(),
         };
         serde_json::to_writer(&mut lines, &header)?;
         writeln!(lines)?;
+        lines.flush()?;
         let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let epoch = u64::try_from(unix.as_micros()).unwrap_or(u64::MAX).saturating_sub(now.micros());
-        Ok(Self { lines, tlog, epoch, flushed: now, has_failed: false })
+        Ok(Self { path, lines, tlog, epoch, has_failed: false })
+    }
+
+    /// Where the record is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Writes an input and what came out of it.
@@ -163,11 +194,9 @@ impl Recorder {
             self.frame(now, &frame.bytes);
         }
         self.note(result);
-        if now.since(self.flushed) >= FLUSH {
-            self.flushed = now;
-            let result = self.lines.flush().and_then(|()| self.tlog.flush());
-            self.note(result);
-        }
+        // A bridge that is killed has told the operating system everything.
+        let result = self.lines.flush().and_then(|()| self.tlog.flush());
+        self.note(result);
     }
 
     fn try_write(&mut self, line: &Line) -> io::Result<()> {
@@ -193,6 +222,45 @@ impl Recorder {
     }
 }
 
+/// New files for a record: at `path`, or beside it where that is taken.
+fn unused(path: &Path) -> io::Result<(PathBuf, File, File)> {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    for number in 1..=NAMES_MAX {
+        let mut beside = path.to_owned();
+        if number > 1 {
+            let extension = path.extension().map(|extension| format!(".{}", extension.to_string_lossy()));
+            beside.set_file_name(format!("{stem}-{number}{}", extension.unwrap_or_default()));
+        }
+        let create = |path: &Path| File::options().write(true).create_new(true).open(path);
+        let is_taken = |error: &io::Error| error.kind() == io::ErrorKind::AlreadyExists;
+        // Both or none: a .tlog alone would be taken for the frames of another record.
+        if beside.with_extension("tlog").exists() {
+            continue;
+        }
+        match create(&beside) {
+            Ok(lines) => {
+                let tlog = create(&beside.with_extension("tlog"))?;
+                return Ok((beside, lines, tlog));
+            }
+            Err(error) if is_taken(&error) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{NAMES_MAX} records of that name are there")))
+}
+
+/// Where a record ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// With a whole line.
+    Whole,
+    /// In the middle of this line, counted from 1: the program was killed or the power was lost.
+    Cut {
+        /// The line.
+        line: usize,
+    },
+}
+
 /// What a replay found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replayed {
@@ -200,6 +268,10 @@ pub struct Replayed {
     pub inputs: usize,
     /// Outputs that were the same, bit for bit.
     pub outputs: usize,
+    /// Time of the last input.
+    pub last: Time,
+    /// Where the record ends.
+    pub ending: Ending,
 }
 
 /// Reads a record, line by line as it is written, and feeds it to a flight.
@@ -207,7 +279,7 @@ pub struct Reader {
     name: String,
     lines: BufReader<File>,
     /// The line that is being read: a record that grows may end in the middle of one.
-    line: String,
+    line: Vec<u8>,
     number: usize,
     scenario: ScenarioFile,
     flight: Flight,
@@ -228,6 +300,17 @@ pub struct Fed {
 
 const RECORD: &str = "give the file that `quietpath-bridge run --record` wrote";
 
+/// Reads on in a line; true where it is whole.
+fn read_line(file: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
+    let left = LINE_MAX.saturating_sub(line.len());
+    let count = file.by_ref().take(left as u64).read_until(b'\n', line)?;
+    let is_whole = line.last() == Some(&b'\n');
+    if count >= left && !is_whole {
+        return Err(io::Error::new(io::ErrorKind::InvalidData, format!("it has more than {LINE_MAX} bytes")));
+    }
+    Ok(is_whole)
+}
+
 impl Reader {
     /// Opens a record, and makes the flight that it is of.
     ///
@@ -236,20 +319,26 @@ impl Reader {
     pub fn open(path: &Path) -> Result<Self, Box<FileError>> {
         let name = path.display().to_string();
         let fail = |message: String, help: &str| Box::new(FileError::whole(&format!("{name}:1"), message, help));
-        let file = File::open(path).map_err(|error| fail(format!("cannot be read: {error}"), RECORD))?;
-        let mut lines = BufReader::new(file);
-        let mut first = String::new();
-        lines.read_line(&mut first).map_err(|error| fail(format!("cannot be read: {error}"), RECORD))?;
-        let header: Header =
-            serde_json::from_str(&first).map_err(|error| fail(format!("is no record: {error}"), RECORD))?;
+        let unreadable = |error: io::Error| fail(format!("cannot be read: {error}"), RECORD);
+        let mut lines = BufReader::new(File::open(path).map_err(unreadable)?);
+        let mut first = Vec::new();
+        let is_whole = read_line(&mut lines, &mut first).map_err(unreadable)?;
+        let header: Header = serde_json::from_slice(&first).map_err(|error| match error.is_eof() && !is_whole {
+            true => fail("ends before the flight begins".into(), "the program was killed at once: nothing is lost"),
+            false => fail(format!("is no record: {error}"), RECORD),
+        })?;
         if header.quietpath_record != VERSION {
             let version = header.quietpath_record;
             let message = format!("is a record of version {version}, and this program reads {VERSION}");
             return Err(fail(message, "replay it with the program that wrote it"));
         }
         let scenario = ScenarioFile::parse(&header.scenario_name, &header.scenario)?.scenario;
-        let flight = Flight::new(&scenario, &header.plan, header.settings)?;
-        Ok(Self { name, lines, line: String::new(), number: 1, scenario, flight })
+        let mut flight = Flight::new(&scenario, &header.plan, header.settings)?;
+        if let Some(journal) = header.journal {
+            let misfit = |why| fail(format!("holds a journal that does not fit: {why}"), RECORD);
+            flight = flight.resuming(journal).map_err(misfit)?;
+        }
+        Ok(Self { name, lines, line: Vec::new(), number: 1, scenario, flight })
     }
 
     /// The scenario that the flight began with.
@@ -264,6 +353,12 @@ impl Reader {
         &self.flight
     }
 
+    /// Where the record ends, as far as it was read.
+    #[must_use]
+    pub const fn ending(&self) -> Ending {
+        if self.line.is_empty() { Ending::Whole } else { Ending::Cut { line: self.number + 1 } }
+    }
+
     /// Feeds the next line; `None` where there is none yet, or the last one is not complete.
     ///
     /// # Errors
@@ -272,11 +367,11 @@ impl Reader {
         let number = self.number + 1;
         let name = &self.name;
         let fail = |message: String| Box::new(FileError::whole(&format!("{name}:{number}"), message, RECORD));
-        self.lines.read_line(&mut self.line).map_err(|error| fail(format!("cannot be read: {error}")))?;
-        if !self.line.ends_with('\n') {
+        let is_whole = read_line(&mut self.lines, &mut self.line);
+        if !is_whole.map_err(|error| fail(format!("cannot be read: {error}")))? {
             return Ok(None);
         }
-        let parsed: Line = serde_json::from_str(&self.line).map_err(|error| fail(format!("is broken: {error}")))?;
+        let parsed: Line = serde_json::from_slice(&self.line).map_err(|error| fail(format!("is broken: {error}")))?;
         let input = parsed.input.and_then(Written::into_input).ok_or_else(|| fail("holds no input".into()))?;
         self.line.clear();
         self.number = number;
@@ -285,14 +380,14 @@ impl Reader {
     }
 }
 
-/// Feeds a record to a new flight; `each` gets every input's time and outputs. A record that ends in the middle of a line was
-/// cut off by a loss of power: what stands before counts.
+/// Feeds a record to a new flight; `each` gets every input's time and outputs. A record that was cut off is replayed as
+/// far as it goes.
 ///
 /// # Errors
 /// A file that is no record; the first line whose outputs differ, with both.
 pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Replayed, Box<FileError>> {
     let mut reader = Reader::open(path)?;
-    let mut replayed = Replayed { inputs: 0, outputs: 0 };
+    let mut replayed = Replayed { inputs: 0, outputs: 0, last: Time::ZERO, ending: Ending::Whole };
     while let Some(Fed { time, outputs, recorded, .. }) = reader.feed()? {
         let outputs: Vec<String> = outputs.iter().map(written).collect();
         if outputs != recorded {
@@ -303,7 +398,9 @@ pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Repl
         }
         replayed.inputs += 1;
         replayed.outputs += outputs.len();
+        replayed.last = time;
         each(time, &outputs);
     }
+    replayed.ending = reader.ending();
     Ok(replayed)
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
-use quietpath_bridge::planning::{Options, assess, plan};
+use quietpath_bridge::planning::{Memory, Options, assess, plan};
 use quietpath_bridge::replan::job::{Rejected, rest};
 use quietpath_bridge::replan::worker::carry_out;
 use quietpath_bridge::replan::{Answer, Job, Observation, Worker, judge};
@@ -41,7 +41,7 @@ fn job(world: &ScenarioFile, flying: &PlanFile, seam: f64) -> Job {
 }
 
 fn answer(job: &Job) -> Answer {
-    Answer { number: job.number, result: carry_out(job, Duration::from_secs(60)) }
+    Answer { number: job.number, result: carry_out(job, Duration::from_secs(60), &mut Memory::default()) }
 }
 
 #[test]
@@ -108,4 +108,19 @@ fn budgets_of_the_rest_are_what_is_left() {
     let left = job.scenario.agents[0].jammer.expect("a jammer").budget;
     assert!((left - (30.0 - 4.5 * interval)).abs() < 1e-9, "{left}");
     assert_eq!(job.tail.agents[0].jam.as_deref().map(|jam| jam[1]), Some(0.25));
+}
+
+#[test]
+fn memory_that_is_kept_holds_nothing_of_earlier_plans() {
+    let (mut world, flying) = begin();
+    let mut memory = Memory::default();
+    for (seam, place) in [(8.0, 18.0), (15.0, 6.0), (8.0, 11.0)] {
+        let seen = format!("{{\"id\": \"s1\", \"position\": [14.0, {place}]}}");
+        Observation::parse(&seen).expect("read").apply(&mut world, 0.0, 1.0).expect("applied");
+        let job = job(&world, &flying, seam);
+        let (mut kept, _) = carry_out(&job, Duration::from_secs(60), &mut memory).expect("a plan");
+        let Ok((mut fresh, _)) = answer(&job).result else { panic!("a plan") };
+        (kept.timing, fresh.timing) = (None, None);
+        assert_eq!(kept, fresh);
+    }
 }

@@ -57,7 +57,7 @@ The bridge knows where sensors are, hears where they move, and plans anew in fli
 takes off; sensors are the scenario's, nothing is jammed, and quietpath autopilot is such a vehicle. Ctrl-C ends the
 flight, and what was flown is written all the same.
 
-Exit status: 0 at the goal, 1 ended before it, 2 bad input.
+Exit status: 0 at the goal, 1 ended before it, 2 bad input or no feasible plan to begin with.
 
 Example:
   quietpath fly scenario.toml --like ardupilot --mode mission --loss 0.1 --out out")]

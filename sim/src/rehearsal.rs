@@ -17,6 +17,7 @@ use quietpath_bridge::file::{FileError, PlanFile, ScenarioFile};
 use quietpath_bridge::flight::{self, End, Flight, Input, Level, Output};
 use quietpath_bridge::link::memory::{Faults, Wire};
 use quietpath_bridge::link::{Accept, Endpoint, Identity, Source, codec};
+use quietpath_bridge::planning::Memory;
 use quietpath_bridge::record::Recorder;
 use quietpath_bridge::replan::worker::carry_out;
 use quietpath_bridge::replan::{Answer, Observation};
@@ -138,6 +139,7 @@ pub struct Rehearsal {
     tick: Duration,
     planning: Duration,
     answers: VecDeque<(Time, Answer)>,
+    memory: Memory,
     began: Option<Time>,
     start_time: f64,
     recorder: Option<Recorder>,
@@ -169,6 +171,7 @@ impl Rehearsal {
             tick,
             planning,
             answers: VecDeque::new(),
+            memory: Memory::default(),
             began: None,
             start_time,
             recorder: None,
@@ -246,9 +249,9 @@ impl Rehearsal {
                     self.up.send(self.now, &bytes);
                 }
                 Output::Board(system) => self.ours.board(system),
-                Output::RoundTrip(_) => {}
+                Output::RoundTrip(_) | Output::Keep(_) => {}
                 Output::Plan(job) => {
-                    let answer = Answer { number: job.number, result: carry_out(&job, DEADLINE) };
+                    let answer = Answer { number: job.number, result: carry_out(&job, DEADLINE, &mut self.memory) };
                     self.answers.push_back((self.now + self.planning, answer));
                 }
                 Output::Say(level, text) => self.events.push(Event::Said(level, text)),

@@ -6,10 +6,11 @@
 //! | load | processor time of the bridge's process over a while of steered flight without planning anew |
 //! | endurance | memory and threads of both processes, and the bridge's heartbeats, over a long flight under faults |
 //!
-//! `cargo run --package quietpath-tests --bin live` prints them. Nothing here is a test of time: other work on the machine
+//! `cargo xtask live` writes them to `docs/live.md`. Nothing here is a test of time: other work on the machine
 //! shows in all of it.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::io::{self, BufRead as _, BufReader};
 use std::net::UdpSocket;
 use std::path::Path;
@@ -92,8 +93,27 @@ fn vehicle(folder: &Folder, port: u16, seconds: f64) -> std::thread::JoinHandle<
 pub struct Latencies {
     /// From being sent to the first setpoint of the plan that they asked for, s, in order of size.
     pub seconds: Vec<f64>,
+    /// Observations that were sent.
+    pub count: usize,
     /// Plans that did not fly: why, and how many.
     pub refused: BTreeMap<String, usize>,
+}
+
+impl Latencies {
+    /// A quantile, ms.
+    fn at(&self, share: f64) -> f64 {
+        let place = (share * self.seconds.len().saturating_sub(1) as f64).round() as usize;
+        self.seconds.get(place).copied().unwrap_or(f64::NAN) * 1e3
+    }
+}
+
+impl fmt::Display for Latencies {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [median, ninety, most, all] = [0.5, 0.9, 0.99, 1.0].map(|share| self.at(share));
+        writeln!(f, "median {median:.1} ms, 90 % {ninety:.1} ms, 99 % {most:.1} ms, largest {all:.1} ms")?;
+        writeln!(f, "{} of {} observations came to fly", self.seconds.len(), self.count)?;
+        self.refused.iter().try_for_each(|(why, count)| writeln!(f, "{count} plans did not fly: {why}"))
+    }
 }
 
 /// Latencies of `count` observations of square8-detection (60 intervals, 8 sensors), s, in order of size.
@@ -104,7 +124,7 @@ pub struct Latencies {
 pub fn latencies(count: usize) -> Latencies {
     let folder = Folder::new();
     let config = "[flight]\nmode = \"guided\"\nsetpoint_hz = 20.0\n[flight.replan]\ninterval_s = 1000.0\n\
-                  time_to_live_s = 1000.0\nprompt_lead_s = 0.02\ndeadline_s = 1.0\n";
+                  time_to_live_s = 1000.0\nprompt_lead_s = 0.03\ndeadline_s = 1.0\n";
     prepare(&folder, "square8-detection", config);
     let (port, tracker) = (free_port(), free_port());
     let (record, link) = (folder.path("flight.jsonl"), format!("udpin:127.0.0.1:{port}"));
@@ -133,6 +153,7 @@ pub fn latencies(count: usize) -> Latencies {
     let (came, _) = flying.join().expect("the vehicle flew");
     let mut found = first_setpoints(Path::new(&record), &sent, &came).expect("a record");
     found.seconds.sort_by(f64::total_cmp);
+    found.count = count;
     found
 }
 
@@ -211,6 +232,20 @@ pub struct Endured {
     pub ended: Option<i32>,
 }
 
+impl fmt::Display for Endured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { seconds, memory, threads, heartbeat_max, heartbeats, plans, ended } = self;
+        writeln!(f, "{seconds:.0} s of flight, {plans} plans flown")?;
+        writeln!(f, "memory {} kB after a quarter, {} kB at the end", memory[0], memory[1])?;
+        writeln!(f, "threads {} to {}", threads[0], threads[1])?;
+        writeln!(f, "{heartbeats} heartbeats, the longest gap {heartbeat_max:.2} s of the flight")?;
+        match ended {
+            None => writeln!(f, "flown to the end"),
+            Some(status) => writeln!(f, "ENDED BEFORE with exit status {status}"),
+        }
+    }
+}
+
 /// Flies wight-jam in the time of its own for `seconds` of the flight, `speedup` times faster than time, with a tenth of
 /// the frames lost, duplicates, corruption, delay and reordering.
 ///
@@ -280,4 +315,31 @@ fn heartbeats(record: &Path, endured: &mut Endured) -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// The page of the figures.
+#[must_use]
+pub fn page(machine: &str, latency: &str, load: &str, endurance: &str, speedup: f64) -> String {
+    let block = |text: &str| format!("```text\n{}\n```", text.trim_end());
+    [
+        "# The bridge, measured while it flies",
+        "Written by `cargo xtask live`: the program `quietpath-bridge` flies the simulated autopilot over loopback UDP.",
+        machine,
+        "## From an observation to the first setpoint of the new plan",
+        "square8-detection, 60 intervals, 8 sensors; a tracker reports a sensor four times a second to the UDP port, each \
+         report asks for a plan, and the plan's first setpoint is timed where it arrives at the vehicle's socket. Setpoints \
+         go out 20 times a second, so waiting for the next one takes up to 50 ms by itself where a plan does not hurry it.",
+        &block(latency),
+        "## Processor",
+        "The share of one core that the bridge takes while it steers, without planning anew.",
+        &block(load),
+        "## Endurance",
+        &format!(
+            "wight-jam for an hour at {speedup:.0} times its speed, a plan every 30 s, with 10 % of the frames lost in each \
+             direction, 5 % coming twice, 1 % with a flipped bit, 40 to 120 ms late and out of order."
+        ),
+        &block(endurance),
+    ]
+    .join("\n\n")
+        + "\n"
 }

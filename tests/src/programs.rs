@@ -44,11 +44,13 @@ pub fn built(name: &str) -> PathBuf {
     let folder = FOLDER.get_or_init(|| {
         let here = std::env::current_exe().expect("a program knows where it is");
         let folder = here.ancestors().find(|folder| folder.join("deps").is_dir()).expect("a target folder");
-        let profile = if folder.ends_with("release") { "release" } else { "test" };
         let mut build = Command::new(env!("CARGO"));
-        // Tests that start a program are built with it. Other commands would build all crates with other features.
-        build.args(["test", "--no-run", "--quiet", "--workspace", "--test", "interoperate", "--test", "cli"]);
-        build.args(["--profile", profile]);
+        if folder.ends_with("release") {
+            build.args(["build", "--quiet", "--workspace", "--bins", "--release"]);
+        } else {
+            // Tests that start a program are built with it. Other commands would build all crates with other features.
+            build.args(["test", "--no-run", "--quiet", "--workspace", "--test", "interoperate", "--test", "cli"]);
+        }
         build.current_dir(crate::repository()).env("CARGO_TARGET_DIR", folder.parent().expect("a target folder"));
         assert!(build.status().is_ok_and(|status| status.success()), "the programs can be built");
         folder.to_owned()

@@ -1,11 +1,12 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`,
-//! `sizes`, `ci`, `pictures`, `gallery`, `bench`, `count`.
+//! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `numbers`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
 
 mod count;
 mod firmware;
+mod fuzz;
 mod step;
 
 use std::path::Path;
@@ -67,6 +68,24 @@ enum Command {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
         arguments: Vec<String>,
     },
+    /// Every fuzz target in turn; writes docs/hardening/fuzz.md. Needs a nightly toolchain and cargo-fuzz
+    Fuzz {
+        /// How long each target is fuzzed
+        seconds: u64,
+        /// This target alone; writes no page
+        #[arg(long)]
+        only: Option<String>,
+    },
+    /// Plans random problems in f32 and f64 and judges the plans; writes docs/hardening/numbers.md
+    Numbers {
+        /// Problems
+        #[arg(default_value_t = 10_000)]
+        count: u64,
+    },
+    /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
+    Deny,
+    /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
+    Live,
     /// The instructions of one plan, counted by valgrind, in all and by function
     Count {
         /// A published scenario
@@ -92,7 +111,15 @@ fn run(command: &Command) -> anyhow::Result<bool> {
     let top = Path::new(env!("CARGO_MANIFEST_DIR")).parent().context("xtask lies in a folder of the repository")?;
     let steps = match command {
         Command::Bench { arguments } => vec![bench(arguments)],
+        Command::Live => vec![
+            // As the measurement itself builds the programs that it starts.
+            Step::cargo("the programs", "build --workspace --bins --release"),
+            Step::new("the bridge in flight", "target/release/live", "page"),
+        ],
         Command::Count { scenario } => return count::count(scenario, top),
+        Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
+        Command::Numbers { count } => vec![numbers(*count)],
+        Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test(),
         Command::Target => return firmware::target(top),
@@ -134,12 +161,11 @@ fn check() -> Vec<Step> {
 }
 
 fn test() -> Vec<Step> {
-    let interoperate = "test --package quietpath-bridge --test interoperate -- --ignored";
-    let browser = "test --package quietpath-sim --test page -- --ignored";
-    let mut steps =
-        vec![Step::cargo("tests", "test --workspace"), Step::cargo("other people's MAVLink", interoperate)];
+    // With the whole workspace, or its crates are built again with other features.
+    let others = "test --workspace --test interoperate --test page -- --ignored";
+    let mut steps = vec![Step::cargo("tests", "test --workspace")];
     steps.extend(chromium());
-    steps.push(Step::cargo("the report in a browser", browser));
+    steps.push(Step::cargo("other people's MAVLink, and the report in a browser", others));
     steps.push(Step::cargo("the firmware under QEMU", "xtask target"));
     steps.push(Step::cargo("sizes of the firmware", "xtask sizes --compare"));
     steps
@@ -159,6 +185,11 @@ fn chromium() -> Vec<Step> {
 fn bench(arguments: &[String]) -> Step {
     let program = "run --release --package quietpath-tests --bin bench --";
     Step::cargo("measurements", [&[program.to_owned()], arguments].concat().join(" ").trim_end())
+}
+
+fn numbers(count: u64) -> Step {
+    let program = "run --release --package quietpath-abuse --bin numbers --";
+    Step::cargo("random problems", &format!("{program} {count} --out docs/hardening/numbers.md"))
 }
 
 fn pictures() -> Vec<Step> {

@@ -14,18 +14,52 @@ pub use error::{FileError, Place, Warning};
 pub use plan::PlanFile;
 pub use scenario::ScenarioFile;
 
-use std::io::Read;
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Largest file that is read, bytes: far more than the largest scenario or plan that fits this build.
+pub const FILE_MAX: u64 = 32 << 20;
+
+/// Reads a whole file, up to [`FILE_MAX`].
+///
+/// # Errors
+/// The file cannot be read, or is larger.
+pub fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
+    limited(std::fs::File::open(path)?)
+}
+
+fn limited(source: impl Read) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    source.take(FILE_MAX + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > FILE_MAX {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it has more than {FILE_MAX} bytes")));
+    }
+    Ok(bytes)
+}
 
 /// Reads a text file, or standard input where `path` is `-`: what errors call it, and its text.
 fn read_text(path: &str, help: &str) -> Result<(String, String), Box<FileError>> {
     let name = if path == "-" { "<stdin>" } else { path };
-    let mut bytes = Vec::new();
     let read = match path {
-        "-" => std::io::stdin().read_to_end(&mut bytes).map(|_| ()),
-        _ => std::fs::read(path).map(|content| bytes = content),
+        "-" => limited(io::stdin().lock()),
+        _ => read_limited(Path::new(path)),
     };
     let failed = |message: String| Box::new(FileError::whole(name, message, help));
-    read.map_err(|error| failed(format!("cannot be read: {error}")))?;
+    let bytes = read.map_err(|error| failed(format!("cannot be read: {error}")))?;
     let text = String::from_utf8(bytes).map_err(|_| failed("is not text in UTF-8".to_owned()))?;
     Ok((name.to_owned(), text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_without_end_is_refused() {
+        let error = limited(io::repeat(b' ')).expect_err("it has no end");
+        assert_eq!(error.to_string(), "it has more than 33554432 bytes");
+        let error = ScenarioFile::read("/dev/zero").expect_err("it has no end").to_string();
+        assert!(error.contains("/dev/zero") && error.contains("more than 33554432 bytes"), "{error}");
+        assert_eq!(limited(&b"abc"[..]).expect("short"), b"abc");
+    }
 }

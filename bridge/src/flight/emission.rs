@@ -38,7 +38,9 @@ impl Flight {
                 .filter(|values| !values.is_empty())
                 .map_or(0.0, |values| step_value(&times, values, time))
         };
-        Some(Emission { level: control(&plan.jam), azimuth: control(&plan.azimuth), dropout: control(&plan.dropout) })
+        // A bridge that died does not jam again: see `resume`.
+        let level = if self.is_resumed { 0.0 } else { control(&plan.jam) };
+        Some(Emission { level, azimuth: control(&plan.azimuth), dropout: control(&plan.dropout) })
     }
 
     /// The mode in which the vehicle flies the plan.

@@ -19,8 +19,6 @@ const SETTLE: f64 = 2.0;
 const NODE_TOLERANCE: f64 = 1e-6;
 /// How long a steered vehicle may take to the goal after its time, s.
 const ARRIVE_MAX: f64 = 30.0;
-/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
-const BEHIND: usize = 2;
 
 impl Flight {
     /// The plan that flies, or is about to.
@@ -121,6 +119,7 @@ impl Flight {
         let Some(job) = job else {
             // Too little is left: the plan is good to its end.
             self.flying.made = time;
+            self.keep();
             return;
         };
         self.jobs += 1;
@@ -136,7 +135,8 @@ impl Flight {
             Err(why) => self.say(Level::Warn, format!("the plan for {:.1} s does not fly: {why}", job.seam)),
             Ok((plan, curve)) if matches!(self.phase, Phase::Fly) => {
                 let budgets = job.scenario.agents.first().map(|agent| (agent.jammer, agent.dropout));
-                let next = Flying { plan, curve, made: time, nodes: Vec::new(), budgets };
+                let is_rest = self.settings.mode == FlyMode::Mission;
+                let next = Flying { plan, curve, made: time, nodes: Vec::new(), budgets, is_rest };
                 match self.settings.mode {
                     FlyMode::Guided => self.next = Some(next),
                     FlyMode::Mission => self.begin_update(next),
@@ -144,14 +144,6 @@ impl Flight {
             }
             Ok(_) => {}
         }
-    }
-
-    /// A new plan flies. What is spent before it is spent: its budgets are those of the rest.
-    fn take_over(&mut self, next: Flying) {
-        if let (Some((jammer, dropout)), Some(agent)) = (next.budgets, self.world.agents.first_mut()) {
-            (agent.jammer, agent.dropout) = (jammer, dropout);
-        }
-        self.flying = next;
     }
 
     /// Sends the rest of the mission: what the plan that flies still does up to the seam, then the new plan.
@@ -164,12 +156,10 @@ impl Flight {
         };
         next.budgets = plan.as_ref().and_then(|plan| budgets_at(&self.world, &self.flying.plan, plan.start_time));
         (next.plan, next.curve) = (plan.unwrap_or_default(), curve);
-        let mut mission = match self.mission_of(&next.plan) {
-            Ok(mission) => mission,
+        let (items, nodes) = match self.items_of(&vehicle, &next.plan, next.is_rest) {
+            Ok(both) => both,
             Err(why) => return self.say(Level::Warn, format!("a plan makes no mission: {why}")),
         };
-        mission.items.drain(..BEHIND.min(mission.items.len()));
-        let (items, nodes) = self.wire_mission(&vehicle, &mission, &next.plan, 1);
         next.nodes = nodes;
         let talk = self.talk(vehicle.identity, List::Mission);
         self.update = Some(Box::new(Delivery::new(talk, vehicle.autopilot, items, self.pace())));

@@ -11,6 +11,7 @@
 //! | phase | what happens | ends when |
 //! |---|---|---|
 //! | Connect | heartbeats; the autopilot is found | it is heard |
+//! | PickUp | only after the bridge died in flight: see [`Journal`] | the vehicle is looked at |
 //! | Deliver | fence, rally points and, in mission mode, the mission are uploaded and read back | the autopilot holds them |
 //! | Ready | a person arms, takes off, or starts the mission | it flies |
 //! | Approach | setpoints to the start, the mode is asked for | it is there and slow |
@@ -27,6 +28,7 @@ mod emission;
 mod fly;
 mod guard;
 mod prepare;
+mod resume;
 mod schedule;
 pub mod settings;
 
@@ -49,6 +51,7 @@ use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
 use crate::telemetry::{INTERVALS, Mode, Telemetry, Vehicle, mode_command};
 
+pub use resume::Journal;
 pub use settings::{FlyMode, OnFailure, Settings};
 
 /// Time between heartbeats.
@@ -100,6 +103,8 @@ pub enum Output {
     RoundTrip(Duration),
     /// Plan.
     Plan(Box<Job>),
+    /// Keep this for a bridge that picks the flight up if this one dies; nothing any more where it is `None`.
+    Keep(Option<Box<Journal>>),
     /// Tell people.
     Say(Level, String),
     /// The flight is over.
@@ -123,6 +128,7 @@ pub enum End {
 #[derive(Clone, Debug)]
 enum Phase {
     Connect,
+    PickUp { since: Time },
     Deliver { delivery: Box<Delivery>, waiting: Vec<(List, Vec<Item>)> },
     Ready,
     Approach { since: Time },
@@ -142,6 +148,8 @@ struct Flying {
     nodes: Vec<usize>,
     /// Jammer and dropout with what is left of their budgets where the plan begins; the scenario's own where not given.
     budgets: Option<Budgets>,
+    /// Whether it is the rest of a mission that was replaced in flight.
+    is_rest: bool,
 }
 
 /// A flight. See the [module](self).
@@ -151,6 +159,12 @@ pub struct Flight {
     world: ScenarioFile,
     frame: LocalFrame,
     agent: String,
+    /// Which flight this is.
+    digest: String,
+    /// A flight to go on with, and the curve of its plan.
+    picked_up: Option<Box<(Journal, Curve)>>,
+    /// Whether it was picked up in flight.
+    is_resumed: bool,
     us: Identity,
     now: Time,
     telemetry: Telemetry,
@@ -173,6 +187,8 @@ pub struct Flight {
     delivery_s: f64,
     /// The clock's time at the start time of the scenario.
     zero: Option<Time>,
+    /// How far the scenario had got at that time, s.
+    passed: f64,
     /// In mission mode: the item that is flown to, and since when.
     item: Option<(u16, Time)>,
     /// An item that the vehicle was told to go on at, and when.
@@ -225,11 +241,15 @@ impl Flight {
         let relay = Relay::new(settings.payloads(), radiation);
         let telemetry = Telemetry::new(settings.autopilot.choice(), settings.system);
         let made = scenario.start_time;
+        let digest = resume::digest(scenario, plan, &settings);
         Ok(Self {
             settings,
             world: scenario.clone(),
             frame,
             agent,
+            digest,
+            picked_up: None,
+            is_resumed: false,
             us: Identity::COMPANION,
             now: Time::ZERO,
             telemetry,
@@ -242,12 +262,13 @@ impl Flight {
             kept: Vec::new(),
             check: None,
             phase: Phase::Connect,
-            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None },
+            flying: Flying { plan: plan.clone(), curve, made, nodes: Vec::new(), budgets: None, is_rest: false },
             next: None,
             update: None,
             update_begun: Time::ZERO,
             delivery_s: 0.0,
             zero: None,
+            passed: 0.0,
             item: None,
             expected: None,
             doubt: None,
@@ -274,6 +295,7 @@ impl Flight {
     pub const fn phase(&self) -> &'static str {
         match self.phase {
             Phase::Connect => "connect",
+            Phase::PickUp { .. } => "pick up",
             Phase::Deliver { .. } => "deliver",
             Phase::Ready => "ready",
             Phase::Approach { .. } => "approach",
@@ -334,7 +356,7 @@ impl Flight {
     fn scenario_time(&self) -> f64 {
         match (self.settings.mode, self.zero) {
             (_, None) => self.flying.curve.begin(),
-            (FlyMode::Guided, Some(zero)) => self.world.start_time + self.now.since(zero).as_secs_f64(),
+            (FlyMode::Guided, Some(zero)) => self.world.start_time + self.passed + self.now.since(zero).as_secs_f64(),
             (FlyMode::Mission, Some(_)) => self.mission_time(),
         }
     }
@@ -414,6 +436,7 @@ impl Flight {
         let silence = self.silence();
         self.send(silence);
         self.phase = Phase::Ended;
+        self.out.push(Output::Keep(None));
         self.out.push(Output::End(end));
     }
 
@@ -441,7 +464,7 @@ impl Flight {
         }
         self.mode_asked = Some(self.now);
         if let Some(command) = mode_command(vehicle.autopilot, vehicle.airframe, mode) {
-            self.commands.submit(self.now, vehicle.identity, command);
+            self.commands.supersede(self.now, vehicle.identity, command);
         }
     }
 
@@ -482,7 +505,9 @@ impl Flight {
 
     fn advance_phase(&mut self, vehicle: &Vehicle) {
         match &self.phase {
+            Phase::Connect if self.picked_up.is_some() => self.phase = Phase::PickUp { since: self.now },
             Phase::Connect => self.begin_delivery(vehicle),
+            Phase::PickUp { since } => self.pick_up(vehicle, *since),
             Phase::Deliver { .. } => self.advance_delivery(vehicle),
             Phase::Ready => self.wait_for_flight(vehicle),
             Phase::Approach { since } => self.approach(vehicle, *since),

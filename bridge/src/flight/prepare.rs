@@ -19,6 +19,8 @@ use super::{End, Flight, Level, Phase, schedule};
 const HEIGHT_MIN: f64 = 1.0;
 /// How long setpoints are sent before the mode that follows them is asked for.
 const STREAM_FIRST: Duration = Duration::from_secs(1);
+/// Items at the beginning of a mission that a vehicle in the air has behind it: take-off and the first node.
+const BEHIND: usize = 2;
 /// How long a vehicle may take to go on at the item that it was told.
 const EXPECT_MAX: Duration = Duration::from_secs(3);
 /// Speed below which a vehicle has arrived, m/s.
@@ -61,6 +63,21 @@ impl Flight {
         let items = schedule::insert(vehicle.autopilot, items, &nodes, payloads, self.radiation, agent);
         let nodes = item_nodes(&items, has_home, first);
         (items, nodes)
+    }
+
+    /// The mission of a plan, or the rest of one that a vehicle in the air has begun, with the node that each item flies
+    /// to.
+    pub(super) fn items_of(
+        &self,
+        vehicle: &Vehicle,
+        plan: &crate::file::PlanFile,
+        is_rest: bool,
+    ) -> Result<(Vec<Item>, Vec<usize>), String> {
+        let mut mission = self.mission_of(plan)?;
+        if is_rest {
+            mission.items.drain(..BEHIND.min(mission.items.len()));
+        }
+        Ok(self.wire_mission(vehicle, &mission, plan, usize::from(is_rest)))
     }
 
     pub(super) fn begin_delivery(&mut self, vehicle: &Vehicle) {
@@ -129,13 +146,7 @@ impl Flight {
     }
 
     pub(super) fn wait_for_flight(&mut self, vehicle: &Vehicle) {
-        let is_high = vehicle.fix.is_some_and(|fix| fix.above_home_m > HEIGHT_MIN);
-        let is_flying = match vehicle.flying {
-            InAir::Air => true,
-            InAir::Unknown => is_high,
-            InAir::Ground | InAir::Landing => false,
-        };
-        if !vehicle.armed || !is_flying {
+        if !vehicle.armed || !Self::is_in_the_air(vehicle) {
             return;
         }
         match self.settings.mode {
@@ -148,12 +159,21 @@ impl Flight {
         }
     }
 
+    pub(super) fn is_in_the_air(vehicle: &Vehicle) -> bool {
+        match vehicle.flying {
+            InAir::Air => true,
+            InAir::Unknown => vehicle.fix.is_some_and(|fix| fix.above_home_m > HEIGHT_MIN),
+            InAir::Ground | InAir::Landing => false,
+        }
+    }
+
     /// The plan begins now.
     fn take_off(&mut self) {
         self.say(Level::Info, "flying the plan");
         self.zero = Some(self.now);
         self.flying.made = self.flying.curve.begin();
         self.phase = Phase::Fly;
+        self.keep();
     }
 
     pub(super) fn approach(&mut self, vehicle: &Vehicle, since: Time) {

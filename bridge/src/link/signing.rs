@@ -25,7 +25,7 @@ use mavlink::consts::v2::{IFLAG_SIGNED, SIGNATURE_VALUE_SIZE};
 
 use super::codec::Identity;
 use crate::clock::Time;
-use crate::file::FileError;
+use crate::file::{FileError, read_limited};
 
 /// Timestamps reserved at a time, in 10 microseconds: 10 seconds.
 pub const RESERVE: u64 = 1_000_000;
@@ -52,6 +52,10 @@ impl Key {
         Self(bytes)
     }
 
+    pub(crate) const fn bytes(&self) -> &[u8; 32] {
+        &self.0
+    }
+
     /// Reads a key file.
     ///
     /// # Errors
@@ -63,10 +67,10 @@ impl Key {
         let unreadable = |error: std::io::Error| fail(format!("cannot be read: {error}"), make);
         let metadata = fs::metadata(path).map_err(unreadable)?;
         if let Some(mode) = open_to_others(&metadata) {
-            let message = format!("is a signing key, and its permissions {mode:03o} let others than its owner in");
+            let message = format!("is a key, and its permissions {mode:03o} let others than its owner in");
             return Err(fail(message, &format!("chmod 600 {name}")));
         }
-        let bytes = fs::read(path).map_err(unreadable)?;
+        let bytes = read_limited(path).map_err(unreadable)?;
         if let Ok(key) = <[u8; 32]>::try_from(bytes.as_slice()) {
             return Ok(Self(key));
         }
@@ -153,8 +157,8 @@ impl Signing {
         let store = PathBuf::from(store);
         let fail =
             |message: String, help: &str| Box::new(FileError::whole(&store.display().to_string(), message, help));
-        let next = match fs::read_to_string(&store) {
-            Ok(text) => text.trim().parse().map_err(|_| {
+        let next = match read_limited(&store) {
+            Ok(text) => String::from_utf8_lossy(&text).trim().parse().map_err(|_| {
                 fail("is not a timestamp".into(), "write a number greater than any used, in 10 us since 2015")
             })?,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => 0,
@@ -299,7 +303,7 @@ mod tests {
         let problem = Signing::from_key_file(&path, 0, ZERO);
         if cfg!(unix) {
             let error = problem.expect_err("open to others").to_string();
-            assert!(error.contains("is a signing key, and its permissions 6"), "{error}");
+            assert!(error.contains("is a key, and its permissions 6"), "{error}");
             assert!(error.contains("help: chmod 600"), "{error}");
         }
         close(&path);

@@ -5,6 +5,7 @@
 //! | [`plan`] | a plan of a scenario |
 //! | [`roll()`] | a plan in steps, with every step |
 //! | [`improve`] | the same, from an earlier plan |
+//! | [`renew`] | the same for the rest of a flight, from what is left of the plan that flies |
 //! | [`assess()`] | objective, violations and series of a plan, in double precision, from its written numbers alone |
 //! | [`landscape()`], [`landscapes`], [`detection_at`] | a metric over the domain at one time, all of them, one at one place |
 //!
@@ -22,7 +23,7 @@ pub use assess::{AgentSeries, Assessment, assess};
 pub use landscape::{Grid, View, detection_at, landscape, landscapes};
 pub use obstacle::Obstacle;
 pub use roll::{Rolled, Step, roll, roll_through};
-pub use solve::{HostWorkspace, Options, Planned, Precision, Rollout, improve, plan};
+pub use solve::{HostWorkspace, Memory, Options, Planned, Precision, Rollout, improve, plan, renew};
 
 pub use quietpath_core::horizon::Choice;
 pub use quietpath_core::solver::{Extent, Status};

@@ -1,7 +1,9 @@
 //! Planning a scenario file.
 
+use std::any::Any;
 use std::time::{Duration, Instant};
 
+use quietpath_core::horizon::NEAR_ITERATIONS;
 use quietpath_core::solver::{self, Settings, Start, Status, Workspace};
 use quietpath_core::{Point, Real};
 
@@ -13,6 +15,23 @@ use crate::file::{FileError, PlanFile, ScenarioFile};
 
 /// Memory of the planner, host size.
 pub type HostWorkspace<T, const DIM: usize> = Workspace<T, DIM, NODES, SENSORS, AGENTS>;
+
+/// Memory for planning that is kept from one plan to the next: the system takes longer to give it than a short plan takes.
+///
+/// It holds nothing of the plans.
+#[derive(Debug, Default)]
+pub struct Memory(Option<Box<dyn Any + Send>>);
+
+impl Memory {
+    fn take<T: Real, const DIM: usize>(&mut self) -> Box<HostWorkspace<T, DIM>> {
+        let kept = self.0.take().and_then(|kept| kept.downcast().ok());
+        kept.unwrap_or_else(|| Box::new(Workspace::new()))
+    }
+
+    fn keep<T: Real, const DIM: usize>(&mut self, workspace: Box<HostWorkspace<T, DIM>>) {
+        self.0 = Some(workspace);
+    }
+}
 
 /// The floating-point numbers that planning computes with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +60,8 @@ pub struct Options {
     pub precision: Precision,
     /// Largest number of iterations; the planner's own choice where it is not given.
     pub iterations: Option<usize>,
+    /// Largest number of projected-gradient iterations before the refinement, where fewer than the planner's own choice.
+    pub gradient_iterations: Option<usize>,
     /// Time after which the best plan so far is returned, of each step where there are steps. With one, the same call may
     /// give different plans.
     pub deadline: Option<Duration>,
@@ -78,7 +99,7 @@ pub fn plan(scenario: &ScenarioFile, options: &Options) -> Result<Planned, Box<F
     if scenario.rolling.is_some() && options.rollout == Rollout::AsWritten {
         return roll(scenario, options, &mut |_| ()).map(Planned::from);
     }
-    begin(scenario, options, None)
+    begin(scenario, options, None, &mut Memory::default())
 }
 
 /// Plans a scenario in one piece from an earlier plan, such as that of a scenario nearby.
@@ -90,16 +111,40 @@ pub fn plan(scenario: &ScenarioFile, options: &Options) -> Result<Planned, Box<F
 /// As [`plan`]; an earlier plan that does not have the shape of the scenario: see [`PlanFile::fits`].
 pub fn improve(scenario: &ScenarioFile, earlier: &PlanFile, options: &Options) -> Result<Planned, Box<FileError>> {
     earlier.fits("the earlier plan", scenario)?;
-    begin(scenario, options, Some(earlier))
+    begin(scenario, options, Some(earlier), &mut Memory::default())
 }
 
-fn begin(scenario: &ScenarioFile, options: &Options, earlier: Option<&PlanFile>) -> Result<Planned, Box<FileError>> {
+/// Plans the rest of a flight from what is left of the plan that flies, as a step of the rolling horizon does: the earlier
+/// plan is refined after a few iterations, and only where that finds nothing feasible is this [`improve`].
+///
+/// A deadline is that of each of the two.
+///
+/// # Errors
+/// As [`improve`].
+pub fn renew(
+    scenario: &ScenarioFile,
+    earlier: &PlanFile,
+    options: &Options,
+    memory: &mut Memory,
+) -> Result<Planned, Box<FileError>> {
+    earlier.fits("the earlier plan", scenario)?;
+    let near = Options { gradient_iterations: Some(NEAR_ITERATIONS), ..*options };
+    let planned = begin(scenario, &near, Some(earlier), memory)?;
+    if planned.assessment.feasible { Ok(planned) } else { begin(scenario, options, Some(earlier), memory) }
+}
+
+fn begin(
+    scenario: &ScenarioFile,
+    options: &Options,
+    earlier: Option<&PlanFile>,
+    memory: &mut Memory,
+) -> Result<Planned, Box<FileError>> {
     let Solved { mut plan, status, obstacle, iterations, evaluations } =
         super::on_large_stack(|| match (options.precision, scenario.dimension) {
-            (Precision::F32, 3) => solve::<f32, 3>(scenario, options, earlier),
-            (Precision::F32, _) => solve::<f32, 2>(scenario, options, earlier),
-            (Precision::F64, 3) => solve::<f64, 3>(scenario, options, earlier),
-            (Precision::F64, _) => solve::<f64, 2>(scenario, options, earlier),
+            (Precision::F32, 3) => solve::<f32, 3>(scenario, options, earlier, memory),
+            (Precision::F32, _) => solve::<f32, 2>(scenario, options, earlier, memory),
+            (Precision::F64, 3) => solve::<f64, 3>(scenario, options, earlier, memory),
+            (Precision::F64, _) => solve::<f64, 2>(scenario, options, earlier, memory),
         })?;
     let assessment = assess(scenario, &plan, "the plan")?;
     plan.objective = Some(assessment.objective);
@@ -119,9 +164,10 @@ fn solve<T: Real, const DIM: usize>(
     scenario: &ScenarioFile,
     options: &Options,
     earlier: Option<&PlanFile>,
+    memory: &mut Memory,
 ) -> Result<Solved, Box<FileError>> {
     let problem = scenario.to_core::<T, DIM>()?;
-    let mut workspace: Box<HostWorkspace<T, DIM>> = Box::new(Workspace::new());
+    let mut workspace = memory.take::<T, DIM>();
     let earlier = earlier.map(trajectory::<T, DIM>).transpose().map_err(|error| scenario.explain(&error))?;
     let start = earlier.as_deref().map_or(Start::Global, Start::Given);
     let begin = Instant::now();
@@ -134,6 +180,7 @@ fn solve<T: Real, const DIM: usize>(
         timing: Some(PlanTiming { plan_seconds }),
         ..written(scenario, workspace.best())
     };
+    memory.keep(workspace);
     let (status, obstacle) = (outcome.status, outcome.obstacle.as_ref().map(Obstacle::from));
     Ok(Solved { plan, status, obstacle, iterations: outcome.iterations, evaluations: outcome.evaluations })
 }
@@ -144,6 +191,9 @@ pub(super) fn settings<T: Real>(options: &Options) -> Settings<T> {
     if let Some(iterations) = options.iterations {
         settings.iterations = iterations;
         settings.refinements = settings.refinements.min(iterations);
+    }
+    if let Some(iterations) = options.gradient_iterations {
+        settings.iterations = settings.iterations.min(iterations);
     }
     settings
 }

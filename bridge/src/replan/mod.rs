@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`observation`] | where sensors were seen, as others write it |
 //! | [`job`] | the problem of the rest of the flight, and when its answer may fly |
+//! | [`seal`] | observations from other hosts, authenticated |
 //! | [`worker`] | the thread that plans |
 //!
 //! The flying plan is only ever replaced by one that passes [`job::judge`]: feasible, finite, and in time for the seam at
@@ -11,6 +12,7 @@
 
 pub mod job;
 pub mod observation;
+pub mod seal;
 pub mod worker;
 
 pub use job::{Answer, Job, Rejected, judge};

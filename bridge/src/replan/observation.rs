@@ -21,9 +21,10 @@
 //! In MAVLink the same is FOLLOW_TARGET (144) from any component of the vehicle: `custom_state` is the sensor's number in
 //! the scenario, counted from 1, `lat`, `lon`, `alt`, `vel` and `position_cov` (diagonal, m^2) as the message defines them.
 
-use quietpath_core::scenario::{Detection, Ranging};
+use quietpath_core::scenario::{Detection, Pooling, Ranging, Susceptibility};
 use serde::{Deserialize, Serialize};
 
+use crate::capacity::SENSORS;
 use crate::file::ScenarioFile;
 use crate::file::scenario::{KnotEntry, MotionEntry, SensorEntry};
 use crate::frame::{Altitude, LocalFrame, Place};
@@ -175,29 +176,46 @@ impl Observation {
             MotionEntry::Track(vec![knot(time, position), knot(time + AHEAD, later)])
         };
         let (ranging, detection) = (self.ranging.map(Ranging::from), self.detection.map(Detection::from));
-        if let Some(sensor) = scenario.sensors.iter_mut().find(|sensor| sensor.name == self.id) {
-            sensor.motion = motion;
-            sensor.ranging = ranging.or(sensor.ranging);
-            sensor.detection = detection.or(sensor.detection);
-            return Ok(());
+        let known = scenario.sensors.iter().position(|sensor| sensor.name == self.id);
+        let seen = match known.and_then(|index| scenario.sensors.get(index)) {
+            Some(sensor) => SensorEntry {
+                motion,
+                ranging: ranging.or(sensor.ranging),
+                detection: detection.or(sensor.detection),
+                ..sensor.clone()
+            },
+            None => self.new_sensor(scenario, motion, ranging, detection)?,
+        };
+        // What the core would refuse would make every later plan fail, and not this observation alone.
+        seen.check(dimension).map_err(|why| format!("`{}` makes no sensor: {why}", self.id))?;
+        pools(scenario, &seen).map_err(|why| format!("`{}` makes no sensor: {why}", self.id))?;
+        match known.and_then(|index| scenario.sensors.get_mut(index)) {
+            Some(sensor) => *sensor = seen,
+            None => scenario.sensors.push(seen),
         }
+        Ok(())
+    }
+
+    /// A sensor that the scenario does not have.
+    fn new_sensor(
+        &self,
+        scenario: &ScenarioFile,
+        motion: MotionEntry,
+        ranging: Option<Ranging<f64>>,
+        detection: Option<Detection<f64>>,
+    ) -> Result<SensorEntry, String> {
         if ranging.is_none() && detection.is_none() {
             return Err(format!(
                 "`{}` is no sensor of the scenario, and says nothing of `ranging` or `detection`",
                 self.id
             ));
         }
-        let (name, jam) = (
-            self.id.clone(),
-            quietpath_core::scenario::Susceptibility {
-                error_gain: 0.0,
-                error_exponent: 2.0,
-                detect_gain: 0.0,
-                detect_exponent: 2.0,
-            },
-        );
-        scenario.sensors.push(SensorEntry { name, motion, ranging, detection, jam });
-        Ok(())
+        if scenario.sensors.len() >= SENSORS {
+            return Err(format!("`{}` is one sensor too many: this build holds {SENSORS}", self.id));
+        }
+        let (error_gain, detect_gain, error_exponent, detect_exponent) = (0.0, 0.0, 2.0, 2.0);
+        let jam = Susceptibility { error_gain, error_exponent, detect_gain, detect_exponent };
+        Ok(SensorEntry { name: self.id.clone(), motion, ranging, detection, jam })
     }
 
     fn place_in(&self, scenario: &ScenarioFile) -> Result<Vec<f64>, String> {
@@ -228,6 +246,21 @@ impl Observation {
             Some(trace) if trace.is_finite() && trace >= 0.0 => Ok(Some(trace.sqrt())),
             _ => Err(format!("`{}` has a covariance that is none", self.id)),
         }
+    }
+}
+
+/// Refuses an energy detector that cannot be pooled with those that the scenario has.
+fn pools(scenario: &ScenarioFile, seen: &SensorEntry) -> Result<(), String> {
+    let samples = |sensor: &SensorEntry| match sensor.detection {
+        Some(Detection::Energy { samples, .. }) => Some(samples),
+        _ => None,
+    };
+    let others = scenario.sensors.iter().filter(|sensor| sensor.name != seen.name).find_map(samples);
+    match (samples(seen), others) {
+        (Some(samples), Some(others)) if samples != others && scenario.pooling != Pooling::None => {
+            Err(format!("it takes {samples} samples, and those that it is pooled with {others}"))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -281,6 +314,23 @@ mod tests {
     }
 
     #[test]
+    fn a_flood_of_new_sensors_ends_at_the_capacity() {
+        let mut world = scenario();
+        let model = "\"detection\": {\"model\": \"proxy\", \"scale\": 1, \"epsilon\": 0.1, \"path_loss\": 2}";
+        let mut refused = 0;
+        for number in 0..2 * SENSORS {
+            let line = format!("{{\"id\": \"f{number}\", \"position\": [1, 2], {model}}}");
+            let seen = Observation::parse(&line).expect("an observation");
+            if let Err(why) = seen.apply(&mut world, 0.0, 0.5) {
+                assert!(why.contains("one sensor too many: this build holds 128"), "{why}");
+                refused += 1;
+            }
+        }
+        assert_eq!((world.sensors.len(), refused), (SENSORS, SENSORS + scenario().sensors.len()));
+        assert!(world.to_core::<f64, 2>().is_ok(), "it is planned with all the same");
+    }
+
+    #[test]
     fn what_is_wrong_with_an_observation_is_said() {
         let name = scenario().sensors[0].name.clone();
         let cases = [
@@ -292,6 +342,20 @@ mod tests {
             (
                 format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[0.3, 0], [0, 0.3]]}}"),
                 "is uncertain by 0.775, more than 0.5",
+            ),
+            (
+                format!(
+                    "{{\"id\": \"{name}\", \"position\": [1, 2], \"detection\": {{\"model\": \"proxy\", \"scale\": -1, \"epsilon\": 1, \"path_loss\": 2}}}}"
+                ),
+                "makes no sensor: detection.scale",
+            ),
+            (
+                format!("{{\"id\": \"{name}\", \"time\": 1e300, \"position\": [1, 2], \"velocity\": [1, 0]}}"),
+                "makes no sensor: track",
+            ),
+            (
+                format!("{{\"id\": \"{name}\", \"position\": [1e308, 2], \"velocity\": [1e308, 0]}}"),
+                "makes no sensor: track",
             ),
             (
                 format!("{{\"id\": \"{name}\", \"position\": [1, 2], \"covariance\": [[1], []]}}"),

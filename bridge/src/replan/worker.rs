@@ -8,7 +8,7 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use crate::planning::{self, Options};
+use crate::planning::{self, Memory, Options};
 
 use super::{Answer, Job};
 
@@ -28,9 +28,10 @@ impl Worker {
         let (jobs, to_do) = mpsc::sync_channel::<Job>(1);
         let (done, answers) = mpsc::channel();
         let work = move || {
+            let mut memory = Memory::default();
             while let Ok(job) = to_do.recv() {
                 let number = job.number;
-                let result = catch_unwind(AssertUnwindSafe(|| carry_out(&job, deadline)))
+                let result = catch_unwind(AssertUnwindSafe(|| carry_out(&job, deadline, &mut memory)))
                     .unwrap_or_else(|_| Err("the planner panicked".to_owned()));
                 if done.send(Answer { number, result }).is_err() {
                     return;
@@ -57,8 +58,12 @@ impl Worker {
 ///
 /// # Errors
 /// Why there is no plan.
-pub fn carry_out(job: &Job, deadline: Duration) -> Result<(crate::file::PlanFile, bool), String> {
+pub fn carry_out(
+    job: &Job,
+    deadline: Duration,
+    memory: &mut Memory,
+) -> Result<(crate::file::PlanFile, bool), String> {
     let options = Options { deadline: Some(deadline), rollout: planning::Rollout::Once, ..Options::default() };
-    let planned = planning::improve(&job.scenario, &job.tail, &options).map_err(|error| error.to_string())?;
+    let planned = planning::renew(&job.scenario, &job.tail, &options, memory).map_err(|error| error.to_string())?;
     Ok((planned.plan, planned.assessment.feasible))
 }

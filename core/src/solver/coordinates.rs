@@ -46,6 +46,18 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
         Self { offset: [[origin(); NODES]; AGENTS], control, pace: T::ZERO }
     }
 
+    /// Makes the ends zero, which a problem with other intervals may have left otherwise.
+    pub(super) fn pin_ends(&mut self, intervals: usize) {
+        for nodes in &mut self.offset {
+            if let Some(first) = nodes.first_mut() {
+                *first = Point::zeros();
+            }
+            if let Some(last) = nodes.get_mut(intervals) {
+                *last = Point::zeros();
+            }
+        }
+    }
+
     /// Interior nodes 1 .. N-1 of each agent.
     pub(super) fn interior(&self, frame: &Frame<T, DIM, AGENTS>) -> impl Iterator<Item = &[Point<T, DIM>]> {
         let last = frame.intervals;

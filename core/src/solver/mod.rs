@@ -126,6 +126,7 @@ where
 {
     supported(scenario, SENSORS)?;
     workspace.best.resize(scenario.frame.intervals, scenario.agents.len())?;
+    workspace.begin(scenario.frame.intervals);
     start::lay(scenario, settings, start, workspace)?;
     if start::is_straight_only(scenario) {
         let objective = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);

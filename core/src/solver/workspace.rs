@@ -69,6 +69,16 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
         &self.best
     }
 
+    /// Takes on a problem of `intervals`: nothing of an earlier one stays where it would be read.
+    // Inlined into `plan`, rustc 1.95 in the release profile makes that read beyond the agents and crash.
+    #[inline(never)]
+    pub(super) fn begin(&mut self, intervals: usize) {
+        let Self { iterate, candidate, next, anchor, gradient, gradient_next, .. } = self;
+        for each in [iterate, candidate, next, anchor, gradient, gradient_next] {
+            each.pin_ends(intervals);
+        }
+    }
+
     /// The plan, and scratch to weigh it with.
     pub(crate) fn parts(&mut self) -> (&Trajectory<T, DIM, NODES, AGENTS>, &mut [Sample<T, DIM>]) {
         (&self.best, &mut self.scratch)

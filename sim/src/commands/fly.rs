@@ -101,15 +101,16 @@ fn carry_out(scenario: &ScenarioFile, args: &FlyArgs) -> Result<Verdict, Failure
     if let Some(server) = &server {
         say(Stream::Err, &format!("the flight as it goes on: http://{}/\n", server.address()))?;
     }
-    let mut last: Option<Instant> = None;
+    let mut pace = view::Pace::default();
     let flown = fly::fly(scenario, &manner, |look| {
         bar.set_message(words(look.progress, unit_m));
         bar.set_position(parts(&look));
-        let is_due = last.is_none_or(|last| last.elapsed() >= view::EVERY) || look.end.is_some();
+        let is_due = pace.is_due() || look.end.is_some();
+        let begun = Instant::now();
         if let Some(server) = server.as_ref().filter(|_| is_due)
             && let Some(page) = shown(look, metric)?
         {
-            last = Some(Instant::now());
+            pace.shown(begun);
             server.show(page);
         }
         Ok(())

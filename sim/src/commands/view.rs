@@ -6,7 +6,7 @@ use super::plan::background;
 use crate::cli::ViewArgs;
 use crate::fly;
 use crate::outcome::{Failure, Stream, Verdict, say};
-use crate::view::{EVERY, Server, shown};
+use crate::view::{Pace, Server, shown};
 
 /// Shows a flight until a signal ends it.
 ///
@@ -18,13 +18,14 @@ pub fn run(args: &ViewArgs) -> Result<Verdict, Failure> {
     if !args.record.exists() {
         say(Stream::Err, &format!("waiting for {}, which is not there yet\n", args.record.display()))?;
     }
-    let mut last: Option<Instant> = None;
+    let mut pace = Pace::default();
     fly::follow(&args.record, |look| {
-        if last.is_some_and(|last| last.elapsed() < EVERY) && look.end.is_none() {
+        if !pace.is_due() && look.end.is_none() {
             return Ok(());
         }
+        let begun = Instant::now();
         if let Some(page) = shown(look, background(look.world, args.metric)?)? {
-            last = Some(Instant::now());
+            pace.shown(begun);
             server.show(page);
         }
         Ok(())

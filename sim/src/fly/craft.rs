@@ -179,6 +179,7 @@ impl Remote {
                 }
                 Output::Board(system) => self.link.board(system),
                 Output::RoundTrip(span) => self.link.round_trip(span),
+                Output::Keep(_) => {}
                 Output::Say(level, text) => self.said.push((level, text)),
                 Output::End(end) => self.end = Some(end),
                 Output::Plan(job) => {

@@ -104,7 +104,7 @@ impl Craft for Recorded {
                 Output::Send(message) => self.wire.hear(fed.time, Direction::Up, &message),
                 Output::Say(level, text) => said.push((level, text)),
                 Output::End(end) => self.end = Some(end),
-                Output::Board(_) | Output::RoundTrip(_) | Output::Plan(_) => {}
+                Output::Board(_) | Output::RoundTrip(_) | Output::Keep(_) | Output::Plan(_) => {}
             }
         }
         if self.began.is_none() && self.flight().phase() == "fly" {

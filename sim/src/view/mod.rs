@@ -15,7 +15,7 @@
 use std::convert::Infallible;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::Router;
 use axum::extract::{Request, State};
@@ -38,6 +38,8 @@ use crate::rehearsal::revealed;
 
 /// Least time between two events.
 pub const EVERY: Duration = Duration::from_millis(700);
+/// How many times as long as a page took to make nothing is made.
+const REST: u32 = 4;
 
 /// What the server tells: the title, and the data of the page as JSON.
 #[derive(Clone, Debug, Default)]
@@ -46,6 +48,25 @@ pub struct Shown {
     pub title: String,
     /// What [`page::data::gather`] gave, as JSON.
     pub data: String,
+}
+
+/// When to show again: not too often, and not so often that making the page takes more than a part of the time.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Pace {
+    due: Option<Instant>,
+}
+
+impl Pace {
+    /// Whether it is time to show something new.
+    #[must_use]
+    pub fn is_due(&self) -> bool {
+        self.due.is_none_or(|due| Instant::now() >= due)
+    }
+
+    /// Takes note of something that was shown, and that making it began then.
+    pub fn shown(&mut self, begun: Instant) {
+        self.due = Some(Instant::now() + EVERY.max(REST * begun.elapsed()));
+    }
 }
 
 /// A server that goes on until it is dropped.

@@ -4,7 +4,7 @@ use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::plan::AgentPlan;
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::flight::settings::{FlyMode, PayloadEntry, PayloadKind};
-use quietpath_bridge::flight::{End, Flight, Input, Output, Settings};
+use quietpath_bridge::flight::{End, Flight, Input, Journal, Output, Settings};
 use quietpath_bridge::frame::LocalFrame;
 use quietpath_bridge::link::codec::plain_bytes;
 use quietpath_bridge::link::dialect::*;
@@ -90,6 +90,7 @@ pub struct World {
     pub said: Vec<String>,
     pub end: Option<End>,
     pub recorder: Option<Recorder>,
+    pub journal: Option<Journal>,
 }
 
 impl World {
@@ -116,6 +117,7 @@ impl World {
             said: Vec::new(),
             end: None,
             recorder: None,
+            journal: None,
         }
     }
 
@@ -172,6 +174,7 @@ impl World {
                 Output::Plan(job) => self.jobs.push(*job),
                 Output::Say(_, text) => self.said.push(text),
                 Output::End(end) => self.end = Some(end),
+                Output::Keep(journal) => self.journal = journal.map(|journal| *journal),
                 Output::Board(_) | Output::RoundTrip(_) => {}
             }
         }

@@ -21,6 +21,8 @@ pub enum Command {
     Download(DownloadArgs),
     /// Say who is there and how good the link is
     Status(StatusArgs),
+    /// Send lines of observations from standard input to a bridge, sealed with a key
+    Observe(ObserveArgs),
     /// Feed a record to a new flight and compare what comes out, bit for bit
     Replay {
         /// What `run --record` wrote
@@ -109,9 +111,15 @@ pub struct RunArgs {
     /// Record everything to this file, and the frames to a .tlog beside it
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
-    /// Where observations of sensors come from: a file that grows, or udp:HOST:PORT
+    /// Where to keep what a bridge needs that picks this flight up, if this one dies in it
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
+    /// Where observations of sensors come from: a file that grows, or udp:HOST:PORT. Other hosts need --observations-key
     #[arg(long, value_name = "SOURCE")]
     pub observations: Option<String>,
+    /// Key file: datagrams of observations that are not sealed with it are refused
+    #[arg(long, value_name = "FILE")]
+    pub observations_key: Option<PathBuf>,
     /// Allow jamming, where the scenario allows it too. Radiating interference needs lawful authority
     #[arg(long, action = ArgAction::SetTrue)]
     pub arm_jammer: bool,
@@ -148,6 +156,16 @@ pub enum ListArg {
     Fence,
     /// Rally points
     Rally,
+}
+
+#[derive(Args)]
+pub struct ObserveArgs {
+    /// Where the bridge listens: HOST:PORT
+    #[arg(long, value_name = "ADDRESS")]
+    pub to: String,
+    /// The bridge's --observations-key
+    #[arg(long, value_name = "FILE")]
+    pub key: PathBuf,
 }
 
 #[derive(Args)]

@@ -6,6 +6,7 @@
 //! plan = "/etc/quietpath/plan.json"
 //! signing_key = "/etc/quietpath/signing.key"
 //! record = "/var/lib/quietpath/flight.jsonl"
+//! state = "/var/lib/quietpath/flight.state"
 //! observations = "udp:127.0.0.1:14600"
 //!
 //! [flight]
@@ -25,14 +26,16 @@
 use std::path::{Path, PathBuf};
 
 use quietpath_bridge::clock::SystemClock;
-use quietpath_bridge::file::{PlanFile, ScenarioFile};
+use quietpath_bridge::file::{PlanFile, ScenarioFile, read_limited};
 use quietpath_bridge::flight::settings::AutopilotChoice;
 use quietpath_bridge::flight::{FlyMode, Settings};
+use quietpath_bridge::link::signing::Key;
 use quietpath_bridge::link::{Accept, Address, Endpoint, Identity, Link, Signing};
 use serde::Deserialize;
 
 use crate::Outcome;
 use crate::cli::{AutopilotArg, LinkArgs, ModeArg, PlanFiles, RunArgs};
+use crate::observe::Observations;
 
 /// The number of our stream of signatures.
 const SIGNING_LINK: u8 = 0;
@@ -46,7 +49,9 @@ pub struct Config {
     pub plan: Option<PathBuf>,
     pub signing_key: Option<PathBuf>,
     pub record: Option<PathBuf>,
+    pub state: Option<PathBuf>,
     pub observations: Option<String>,
+    pub observations_key: Option<PathBuf>,
     pub flight: Settings,
 }
 
@@ -72,8 +77,10 @@ impl Config {
 
     fn file(path: &Path) -> Result<Self, Outcome> {
         let name = path.display();
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| Outcome::Input(format!("{name}: cannot be read: {error}\n  help: give the path of a configuration file, or leave --config out")))?;
+        let help = "give the path of a configuration file, or leave --config out";
+        let unreadable = |why: String| Outcome::Input(format!("{name}: cannot be read: {why}\n  help: {help}"));
+        let bytes = read_limited(path).map_err(|error| unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not text in UTF-8".into()))?;
         let config: Self = toml::from_str(&text).map_err(|error| Outcome::Input(format!("{name}: {error}")))?;
         if config.flight.jammer_armed {
             let help = "jamming is armed for one flight at a time, by --arm-jammer on the command line";
@@ -93,7 +100,9 @@ impl Config {
     /// The arguments of a flight over it.
     pub fn with_run(mut self, args: &RunArgs) -> Self {
         self.record = args.record.clone().or(self.record);
+        self.state = args.state.clone().or(self.state);
         self.observations = args.observations.clone().or(self.observations);
+        self.observations_key = args.observations_key.clone().or(self.observations_key);
         if let Some(mode) = args.mode {
             self.flight.mode = match mode {
                 ModeArg::Mission => FlyMode::Mission,
@@ -120,6 +129,13 @@ impl Config {
         }
         let plan = PlanFile::read(&plan.display().to_string()).map_err(input)?;
         Ok((loaded.scenario, plan))
+    }
+
+    /// Opens the source of observations.
+    pub fn observed(&self) -> Result<Observations, Outcome> {
+        let key = self.observations_key.as_ref().map(|path| Key::read(path)).transpose();
+        let key = key.map_err(|error| Outcome::Input(error.to_string()))?;
+        Observations::open(self.observations.as_deref(), key).map_err(Outcome::Input)
     }
 
     /// Opens the link.

@@ -6,6 +6,7 @@
 //! | `upload` | uploads the mission and the fence of a plan, and reads them back |
 //! | `download` | writes what the autopilot holds |
 //! | `status` | says who is there, how good the link is, and the value of parameters |
+//! | `observe` | sends observations to a bridge, sealed |
 //! | `replay` | feeds a record to a new flight and compares |
 //!
 //! | exit status | meaning |
@@ -21,6 +22,7 @@ mod cli;
 mod config;
 mod observe;
 mod run;
+mod state;
 mod station;
 mod transfer;
 
@@ -28,7 +30,7 @@ use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
-use quietpath_bridge::record;
+use quietpath_bridge::record::{self, Ending};
 use tracing_subscriber::EnvFilter;
 
 use cli::{Arguments, Command};
@@ -73,6 +75,7 @@ fn main() -> ExitCode {
         Command::Upload(args) => transfer::upload(args),
         Command::Download(args) => transfer::download(args),
         Command::Status(args) => station::status(args),
+        Command::Observe(args) => observe::observe(args),
         Command::Replay { record, quiet } => replay(record, *quiet),
     };
     match &outcome {
@@ -96,6 +99,10 @@ fn replay(path: &std::path::Path, quiet: cli::Quiet) -> Outcome {
     match record::replay(path, each) {
         Ok(replayed) => {
             eprintln!("{} inputs gave the same {} outputs, bit for bit", replayed.inputs, replayed.outputs);
+            if let Ending::Cut { line } = replayed.ending {
+                let seconds = replayed.last.seconds();
+                eprintln!("the record ends in line {line}, after {seconds:.3} s: its program was killed there");
+            }
             Outcome::Done
         }
         Err(error) => Outcome::Input(error.to_string()),

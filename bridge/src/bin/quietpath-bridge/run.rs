@@ -14,7 +14,7 @@ use quietpath_bridge::flight::{End, Flight, Input, Level, Output};
 use quietpath_bridge::link::codec::plain_bytes;
 use quietpath_bridge::link::dialect::MavMessage;
 use quietpath_bridge::link::{Event, Link};
-use quietpath_bridge::record::Recorder;
+use quietpath_bridge::record::{Beginning, Recorder};
 use quietpath_bridge::replan::{Answer, Worker};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
@@ -22,6 +22,7 @@ use crate::Outcome;
 use crate::cli::RunArgs;
 use crate::config::Config;
 use crate::observe::Observations;
+use crate::state::State;
 
 /// Longest that the loop waits for a frame.
 const TICK: Duration = Duration::from_millis(4);
@@ -71,6 +72,7 @@ struct Loop {
     observations: Observations,
     worker: Option<Worker>,
     recorder: Option<Recorder>,
+    state: State,
     stop: Arc<AtomicBool>,
     status: Time,
     status_log: Time,
@@ -82,19 +84,35 @@ impl Loop {
         let config = Config::read(&args.link)?.with_files(&args.files).with_run(args);
         let (scenario, plan) = config.load()?;
         let settings = config.flight.clone();
-        let flight =
-            Flight::new(&scenario, &plan, settings.clone()).map_err(|error| Outcome::Input(error.to_string()))?;
+        let new =
+            || Flight::new(&scenario, &plan, settings.clone()).map_err(|error| Outcome::Input(error.to_string()));
+        let state = State::new(config.state.clone());
+        let (flight, journal) = match state.read() {
+            None => (new()?, None),
+            Some(journal) => match new()?.resuming(journal.clone()) {
+                Ok(flight) => (flight, Some(journal)),
+                Err(why) => {
+                    tracing::warn!("the flight that was interrupted is not this one: {why}");
+                    (new()?, None)
+                }
+            },
+        };
         let clock = SystemClock::at_speed(args.speedup).ok_or_else(|| {
             Outcome::Input("--speedup is how many times faster than time to fly: a number above 0".into())
         })?;
-        let observations = Observations::open(config.observations.as_deref()).map_err(Outcome::Input)?;
+        let observations = config.observed()?;
+        let beginning =
+            Beginning { scenario: &scenario, plan: &plan, settings: &settings, journal: journal.as_ref() };
         let recorder = match &config.record {
             None => None,
             Some(path) => Some(
-                Recorder::create(path, &scenario, &plan, &settings, clock.now())
+                Recorder::create(path, &beginning, clock.now())
                     .map_err(|error| Outcome::Input(format!("{}: cannot be written: {error}", path.display())))?,
             ),
         };
+        if let Some(recorder) = &recorder {
+            tracing::info!("recording to {}", recorder.path().display());
+        }
         let fault = |error: std::io::Error| Outcome::Fault(error.to_string());
         let worker = match settings.replan {
             None => None,
@@ -110,7 +128,8 @@ impl Loop {
         }
         let link = config.open(clock)?;
         let (status, status_log) = (Time::ZERO, Time::ZERO);
-        Ok((flight, Self { link, clock, observations, worker, recorder, stop, status, status_log, end: None }))
+        let around = Self { link, clock, observations, worker, recorder, state, stop, status, status_log, end: None };
+        Ok((flight, around))
     }
 
     fn fly(&mut self, flight: &mut Flight) -> Outcome {
@@ -161,6 +180,7 @@ impl Loop {
                 Output::Send(message) => self.send(now, &message),
                 Output::Board(system) => self.link.board(system),
                 Output::RoundTrip(span) => self.link.round_trip(span),
+                Output::Keep(journal) => self.state.keep(journal.as_deref()),
                 Output::Say(Level::Info, text) => tracing::info!("{text}"),
                 Output::Say(Level::Warn, text) => tracing::warn!("{text}"),
                 Output::End(end) => self.end = Some(end),

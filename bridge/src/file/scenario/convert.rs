@@ -2,10 +2,10 @@
 
 use quietpath_core::error::{Error, Item};
 use quietpath_core::scenario::{
-    Agent, BeamPattern, Betrayal, Detection, Domain, Draft, Dropout, Jammer, Knot, Limit, Motion, Polygon, Pooling,
-    Ranging, Region, Sensor, Shape, Susceptibility, Term, Timing, Window,
+    Agent, AgentSet, BeamPattern, Betrayal, Detection, Domain, Draft, Dropout, Jammer, Knot, Limit, Motion, Polygon,
+    Pooling, Ranging, Reduce, ReferencePoint, Region, Sense, Sensor, Shape, Susceptibility, Term, Timing, Window,
 };
-use quietpath_core::{Point, Real};
+use quietpath_core::{Metric, Point, Real, Scenario};
 
 use super::{AgentEntry, MotionEntry, Outline, RegionEntry, ScenarioFile, SensorEntry};
 use crate::capacity::HostScenario;
@@ -56,6 +56,61 @@ impl ScenarioFile {
         };
         HostScenario::new(&draft).map(Box::new)
     }
+}
+
+impl SensorEntry {
+    /// Whether the core takes this sensor, in a scenario of some dimension.
+    ///
+    /// # Errors
+    /// What is wrong with it, in the words of the core.
+    pub(crate) fn check(&self, dimension: usize) -> Result<(), String> {
+        match dimension {
+            3 => alone::<3>(self),
+            _ => alone::<2>(self),
+        }
+        .map_err(|error| format!("{} {}", error.field, error.fault))
+    }
+}
+
+/// Checks a sensor in the smallest scenario that there is, with the core's own checks.
+fn alone<const DIM: usize>(entry: &SensorEntry) -> Result<(), Error> {
+    let track: Vec<Knot<f64, DIM>> = knots(entry);
+    let (start, goal) = (Point::repeat(0.0), Point::repeat(1.0));
+    let agent = Agent {
+        start,
+        goal,
+        start_velocity: None,
+        speed_max: 1.0,
+        accel_max: 1.0,
+        weight: 1.0,
+        jammer: None,
+        dropout: None,
+    };
+    let term = Term {
+        metric: Metric::Detection,
+        sense: Sense::Minimize,
+        reduce: Reduce::Integral,
+        weight: 1.0,
+        agents: AgentSet::ALL,
+        window: Window::always(),
+    };
+    let draft = Draft {
+        softening: 1.0,
+        reference_point: ReferencePoint::Current,
+        pooling: Pooling::None,
+        intervals: 1,
+        start_time: 0.0,
+        time: Timing { max: 10.0, target: 0.0, penalty: 0.0 },
+        domain: Domain { min: start, max: goal },
+        agents: &[agent],
+        sensors: &[sensor(entry, &track)],
+        terms: &[term],
+        separation: None,
+        regions: &[],
+        limits: &[],
+    };
+    // An observation makes two entries of a track.
+    Scenario::<f64, DIM, 1, 1, 2>::new(&draft).map(|_| ())
 }
 
 /// The first `DIM` numbers; zero where there are fewer.

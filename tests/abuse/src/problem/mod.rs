@@ -1,0 +1,40 @@
+//! Problems for the core, drawn from bytes, and what must be true of every plan.
+//!
+//! Geometry is degenerate on purpose: sensors at one place or in one line, a start at a sensor or at the goal, deadlines
+//! that leave no time, budgets of nothing, one interval.
+
+mod draw;
+mod judge;
+
+pub use draw::{AGENTS, KNOTS, NODES, Problem, SENSORS};
+pub use judge::{Broken, Verdict, judge, roll};
+
+use quietpath_core::Real;
+use quietpath_core::solver::Settings;
+
+use crate::dice::{Dice, Mood};
+
+/// Plans a problem of some bytes, in either precision and both dimensions, and judges the plan.
+///
+/// # Panics
+/// A promise is broken.
+pub fn planned(bytes: &[u8]) {
+    let mut dice = Dice::new(bytes, Mood::Wild);
+    let verdict = match dice.below(4) {
+        0 => one::<f64, 2>(&mut dice),
+        1 => one::<f32, 2>(&mut dice),
+        2 => one::<f64, 3>(&mut dice),
+        _ => one::<f32, 3>(&mut dice),
+    };
+    if let Err(broken) = verdict {
+        panic!("{broken:?}");
+    }
+}
+
+fn one<T: Real, const DIM: usize>(dice: &mut Dice<'_>) -> Result<Verdict, Broken> {
+    let problem = Problem::<T, DIM>::draw(dice);
+    let settings = Settings { iterations: 60, refinements: 20, ..Settings::default() };
+    let verdict = judge(&problem, &settings)?;
+    roll(&problem, &settings, dice)?;
+    Ok(verdict)
+}

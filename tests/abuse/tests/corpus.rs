@@ -1,0 +1,74 @@
+//! Everything that was ever found, and its neighbours, on stable.
+//!
+//! `fuzz/corpus/TARGET` holds seeds, and the smallest input of each fault that a fuzzer has found; scenarios are seeds
+//! too. A fault that is found becomes a file there, with a name that says what it was.
+
+use std::path::{Path, PathBuf};
+
+use fastrand::Rng;
+use quietpath_abuse::TARGETS;
+
+/// Neighbours of each seed that are tried.
+const NEIGHBOURS: u64 = 4;
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    files
+}
+
+/// The same bytes with a few changed, left out or doubled.
+fn neighbour(bytes: &[u8], random: &mut Rng) -> Vec<u8> {
+    let mut near = bytes.to_vec();
+    for _ in 0..random.usize(1..4) {
+        let (from, count) = (random.usize(..near.len().max(1)), random.usize(1..9));
+        let until = (from + count).min(near.len());
+        match random.u8(..3) {
+            0 => near.get_mut(from..until).into_iter().flatten().for_each(|byte| *byte = random.u8(..)),
+            1 => drop(near.drain(from..until)),
+            _ => near.extend_from_within(from..until),
+        }
+    }
+    near
+}
+
+#[test]
+fn every_input_of_the_corpus_keeps_the_promises_and_so_do_its_neighbours() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut random = Rng::with_seed(8);
+    for (name, target) in TARGETS {
+        let mut seeds = files(&top.join("fuzz/corpus").join(name));
+        assert!(!seeds.is_empty(), "{name} has no seeds");
+        if name == "scenario" {
+            seeds.extend(files(&top.join("sim/scenarios")));
+        }
+        let mut tried = 0;
+        for path in &seeds {
+            let bytes = std::fs::read(path).expect("a seed is a file");
+            // A panic names its target and seed.
+            println!("{name} {}", path.display());
+            target(&bytes);
+            for number in 0..NEIGHBOURS {
+                println!("{name} {} neighbour {number}", path.display());
+                target(&neighbour(&bytes, &mut random));
+            }
+            tried += 1 + NEIGHBOURS;
+        }
+        println!("{name}: {tried} inputs");
+    }
+}
+
+#[test]
+fn the_fuzzer_has_every_target_and_no_other() {
+    let top = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let stem = |path: &PathBuf| path.file_stem().expect("a name").to_string_lossy().into_owned();
+    let there: Vec<String> = files(&top.join("fuzz/fuzz_targets")).iter().map(stem).collect();
+    let mut wanted: Vec<String> = TARGETS.iter().map(|(name, _)| (*name).to_owned()).collect();
+    wanted.sort();
+    assert_eq!(there, wanted);
+    let manifest = std::fs::read_to_string(top.join("fuzz/Cargo.toml")).expect("a manifest");
+    for name in wanted {
+        assert!(manifest.contains(&format!("name = \"{name}\"")), "fuzz/Cargo.toml has no binary {name}");
+    }
+}
