@@ -9,17 +9,23 @@
 use core::fmt::{Debug, Display};
 use core::ops::Neg;
 
-use nalgebra::{SVector, Scalar};
-use num_traits::NumAssign;
+use nalgebra::{ArrayStorage, SVector, Scalar};
+use num_traits::{ConstZero, NumAssign};
 
 /// A position, velocity or direction: `DIM` components, east, north and, in three dimensions, up.
 pub type Point<T, const DIM: usize> = SVector<T, DIM>;
+
+/// The origin, as a constant: what memory is filled with that costs nothing in an image.
+#[must_use]
+pub const fn origin<T: Real, const DIM: usize>() -> Point<T, DIM> {
+    Point::from_array_storage(ArrayStorage([[T::ZERO; DIM]]))
+}
 
 /// A floating-point number that the planner can be compiled for: `f32` or `f64`.
 ///
 /// Methods have the meaning of their `libm` namesakes.
 pub trait Real:
-    Scalar + Copy + Debug + Display + Default + PartialOrd + NumAssign + Neg<Output = Self> + Send + Sync
+    Scalar + Copy + Debug + Display + Default + PartialOrd + NumAssign + ConstZero + Neg<Output = Self> + Send + Sync
 {
     /// Distance from 1 to the next larger number.
     const EPSILON: Self;

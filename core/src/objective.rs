@@ -225,7 +225,7 @@ pub(crate) fn merit_gradient<T: Real, const DIM: usize, const NODES: usize, cons
                 add_at(&mut track.dropout, node, derivative.dropout);
             }
         }
-        for emitter in emitters {
+        for emitter in &emitters {
             if let Some(track) = gradient.tracks.get_mut(emitter.agent) {
                 add_at(&mut track.path, node, emitter.adjoint.position);
                 add_at(&mut track.jam, node, emitter.adjoint.level);

@@ -13,8 +13,10 @@
 //!
 //! Limits: `NODES` holds N + 1 nodes, `AGENTS` agents.
 
+use core::cell::Cell;
+
 use crate::error::{Error, Fault, Item};
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, origin};
 use crate::scenario::View;
 
 /// One agent's path and controls; entries past the last node are zero.
@@ -33,9 +35,9 @@ pub struct Track<T, const DIM: usize, const NODES: usize> {
 impl<T: Real, const DIM: usize, const NODES: usize> Track<T, DIM, NODES> {
     /// All zeros.
     #[must_use]
-    pub fn zeros() -> Self {
-        let zero = [T::zero(); NODES];
-        Self { path: [Point::zeros(); NODES], jam: zero, azimuth: zero, dropout: zero }
+    pub const fn zeros() -> Self {
+        let zero = [T::ZERO; NODES];
+        Self { path: [origin(); NODES], jam: zero, azimuth: zero, dropout: zero }
     }
 }
 
@@ -53,8 +55,8 @@ pub struct Trajectory<T, const DIM: usize, const NODES: usize, const AGENTS: usi
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Trajectory<T, DIM, NODES, AGENTS> {
     /// All zeros, on no interval.
     #[must_use]
-    pub fn empty() -> Self {
-        Self { intervals: 0, agents: 0, times: [T::zero(); NODES], tracks: [Track::zeros(); AGENTS] }
+    pub const fn empty() -> Self {
+        Self { intervals: 0, agents: 0, times: [T::ZERO; NODES], tracks: [Track::zeros(); AGENTS] }
     }
 
     /// All zeros, of the given size.
@@ -197,8 +199,16 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
 
 /// Moves entries `count` .. `count + left` to the front, and clears those behind them.
 fn drop_front<V: Copy>(list: &mut [V], count: usize, left: usize, nothing: V) {
-    list.rotate_left(count.min(list.len()));
+    shift(list, count);
     list.get_mut(left + 1..).unwrap_or_default().fill(nothing);
+}
+
+/// Moves entries from `count` on to the front; those behind them stay what they are.
+pub(crate) fn shift<V: Copy>(list: &mut [V], count: usize) {
+    let list = Cell::from_mut(list).as_slice_of_cells();
+    for (to, from) in list.iter().zip(list.iter().skip(count)) {
+        to.set(from.get());
+    }
 }
 
 fn copy_entry<V: Copy>(from: &[V], at: usize, to: &mut [V], end: usize) {

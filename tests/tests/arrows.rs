@@ -8,6 +8,12 @@ fn metadata() -> Metadata {
     MetadataCommand::new().exec().expect("cargo metadata describes the workspace")
 }
 
+/// The workspace of the microcontroller.
+fn microcontroller() -> Metadata {
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../firmware/Cargo.toml");
+    MetadataCommand::new().manifest_path(manifest).no_deps().exec().expect("cargo metadata describes the firmware")
+}
+
 fn package<'a>(metadata: &'a Metadata, name: &str) -> &'a Package {
     let found = metadata.workspace_packages().into_iter().find(|package| package.name.as_str() == name);
     found.unwrap_or_else(|| panic!("the workspace has a package {name}"))
@@ -30,6 +36,11 @@ fn nothing_points_back() {
         if let Some(below) = rank.checked_sub(1).and_then(|below| order.get(below)) {
             assert!(arrows.contains(below), "{name} does not depend on {below}, on which it should stand");
         }
+    }
+    let microcontroller = microcontroller();
+    for name in ["quietpath-capi", "quietpath-flight"] {
+        let arrows = arrows(package(&microcontroller, name));
+        assert_eq!(arrows, BTreeSet::from(["quietpath-core"]), "{name} stands on the core alone");
     }
     let abuse = arrows(package(&metadata, "quietpath-abuse"));
     assert!(

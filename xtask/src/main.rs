@@ -1,10 +1,11 @@
-//! The developer loop: `cargo xtask check`, `test`, `target`, `ci`, `pictures`, `gallery`, `bench`, `live`, `count`,
-//! `fuzz`, `numbers`, `deny`.
+//! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `numbers`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
 
 mod count;
+mod firmware;
 mod fuzz;
 mod step;
 
@@ -14,10 +15,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 
+use firmware::Table;
 use step::Step;
-
-/// What the planning core is compiled for: Cortex-M4F and Cortex-M7F without an operating system.
-const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The scenario whose report is shown on the pages.
 const REPORT: &str = "wight-jam";
@@ -39,10 +38,23 @@ struct Arguments {
 enum Command {
     /// Formatting, lints and documentation, with warnings as errors
     Check,
-    /// All tests, those with programs from PyPI too, and the core for the microcontroller; installs the target if it is missing
+    /// All tests, those with programs from PyPI too, and the firmware; installs what the firmware needs
     Test,
-    /// The core alone for the microcontroller, in f32 and f64
+    /// The firmware: built, run under QEMU, compared with the host bit for bit
     Target,
+    /// The header of the C interface, made anew from its source
+    Header,
+    /// Instructions of pieces of planning on a microcontroller, by size; writes firmware/instructions.md
+    Instructions,
+    /// What the firmware takes of flash, RAM and stack; fails past the budget
+    Sizes {
+        /// Print what changed against the committed table
+        #[arg(long)]
+        compare: bool,
+        /// Write the committed table anew
+        #[arg(long, conflicts_with = "compare")]
+        write: bool,
+    },
     /// What continuous integration runs: check, then test
     Ci,
     /// The pictures of the pages, drawn anew by the program; those of the report need chromium
@@ -110,7 +122,17 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test(),
-        Command::Target => target(),
+        Command::Target => return firmware::target(top),
+        Command::Header => return firmware::header(top),
+        Command::Instructions => return firmware::instructions(top),
+        Command::Sizes { compare, write } => {
+            let table = match (*compare, *write) {
+                (true, _) => Table::Compare,
+                (_, true) => Table::Write,
+                _ => Table::Ignore,
+            };
+            return firmware::sizes(table, top);
+        }
         Command::Ci => check().into_iter().chain(test()).collect(),
         Command::Pictures => pictures(),
         Command::Gallery => vec![Step::cargo("gallery", "run --package quietpath-sim --example gallery")],
@@ -123,14 +145,16 @@ fn run(command: &Command) -> anyhow::Result<bool> {
 }
 
 fn check() -> Vec<Step> {
+    let lints_of_firmware = format!(
+        "clippy --manifest-path firmware/Cargo.toml --target-dir target/firmware --workspace --release --target {} -- -D warnings",
+        firmware::TARGET
+    );
     vec![
         Step::cargo("formatting", "fmt --all --check"),
-        Step::cargo("formatting, embedded", "fmt --manifest-path tests/embedded/Cargo.toml --check"),
+        Step::cargo("formatting of the firmware", "fmt --manifest-path firmware/Cargo.toml --all --check"),
         Step::cargo("lints", "clippy --workspace --all-targets -- -D warnings"),
-        Step::cargo(
-            "lints of the core with defmt",
-            "clippy --package quietpath-core --features defmt -- -D warnings",
-        ),
+        Step::new("target installed", "rustup", &format!("target add {}", firmware::TARGET)),
+        Step::cargo("lints of the firmware", &lints_of_firmware),
         Step::cargo("documentation", "doc --workspace --no-deps --document-private-items")
             .with_env("RUSTDOCFLAGS", "-D warnings"),
     ]
@@ -142,7 +166,8 @@ fn test() -> Vec<Step> {
     let mut steps = vec![Step::cargo("tests", "test --workspace")];
     steps.extend(chromium());
     steps.push(Step::cargo("other people's MAVLink, and the report in a browser", others));
-    steps.extend(target());
+    steps.push(Step::cargo("the firmware under QEMU", "xtask target"));
+    steps.push(Step::cargo("sizes of the firmware", "xtask sizes --compare"));
     steps
 }
 
@@ -155,16 +180,6 @@ fn chromium() -> Vec<Step> {
     }
     let install = "install -qq -y --no-install-recommends chromium";
     vec![Step::new("packages listed", "apt-get", "update -qq"), Step::new("chromium installed", "apt-get", install)]
-}
-
-fn target() -> Vec<Step> {
-    // One folder of artifacts for both: the embedded consumer is a workspace of its own.
-    let embedded = format!("build --manifest-path tests/embedded/Cargo.toml --target-dir target --target {TARGET}");
-    vec![
-        Step::new("target installed", "rustup", &format!("target add {TARGET}")),
-        Step::cargo("core alone", &format!("build --package quietpath-core --target {TARGET}")),
-        Step::cargo("core instantiated in f32 and f64", &format!("{embedded} --release")),
-    ]
 }
 
 fn bench(arguments: &[String]) -> Step {

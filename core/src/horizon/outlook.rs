@@ -4,7 +4,7 @@ use crate::math::Real;
 use crate::metrics::Sample;
 use crate::objective::node_values;
 use crate::scenario::{Sense, View};
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Trajectory, shift};
 
 /// What the objective sums, node by node along a plan.
 #[derive(Clone, Debug)]
@@ -46,7 +46,7 @@ impl<T: Real, const NODES: usize, const AGENTS: usize> Outlook<T, NODES, AGENTS>
     /// Forgets the first `count` intervals, which were flown.
     pub(super) fn advance(&mut self, count: usize) {
         for values in &mut self.values {
-            values.rotate_left(count.min(NODES));
+            shift(values, count);
         }
     }
 

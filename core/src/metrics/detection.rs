@@ -68,7 +68,8 @@ pub(super) fn backward<T: Real, const DIM: usize>(
     let (mut by_level, mut by_dropout) = (T::zero(), T::zero());
     let mut missed_after = T::one();
     let seen = sensors.len().min(samples.len());
-    for (sensor, sample) in sensors.iter().take(seen).zip(samples).rev() {
+    let (sensors, samples) = (sensors.get(..seen).unwrap_or_default(), samples.get_mut(..seen).unwrap_or_default());
+    for (sensor, sample) in sensors.iter().zip(samples).rev() {
         if sensor.detection.as_ref().is_none_or(|detection| pooling.takes(detection)) {
             continue;
         }

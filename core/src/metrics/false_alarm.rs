@@ -41,7 +41,8 @@ pub(super) fn backward<T: Real, const DIM: usize>(
 ) {
     let mut quiet_after = T::one();
     let seen = sensors.len().min(samples.len());
-    for (sensor, sample) in sensors.iter().take(seen).zip(samples).rev() {
+    let (sensors, samples) = (sensors.get(..seen).unwrap_or_default(), samples.get_mut(..seen).unwrap_or_default());
+    for (sensor, sample) in sensors.iter().zip(samples).rev() {
         if sensor.detection.is_none() {
             continue;
         }

@@ -7,7 +7,7 @@
 //! | y_j | `place` | length unit | `DIM` |
 //! | d^2 | `square` | length unit squared | |
 
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, origin};
 use crate::metrics::{Adjoint, Needs, Values, detection, false_alarm, fisher, pooled};
 use crate::model::jamming::Emitter;
 use crate::model::soft_square;
@@ -46,9 +46,11 @@ pub struct Sample<T, const DIM: usize> {
     pub(super) quiet_before: T,
 }
 
-impl<T: Real, const DIM: usize> Default for Sample<T, DIM> {
-    fn default() -> Self {
-        let (zero, origin) = (T::zero(), Point::zeros());
+impl<T: Real, const DIM: usize> Sample<T, DIM> {
+    /// A sample of nothing.
+    #[must_use]
+    pub const fn zeros() -> Self {
+        let (zero, origin) = (T::ZERO, origin());
         Self {
             place: origin,
             velocity: origin,
@@ -72,6 +74,12 @@ impl<T: Real, const DIM: usize> Default for Sample<T, DIM> {
             alarm_slope: zero,
             quiet_before: zero,
         }
+    }
+}
+
+impl<T: Real, const DIM: usize> Default for Sample<T, DIM> {
+    fn default() -> Self {
+        Self::zeros()
     }
 }
 

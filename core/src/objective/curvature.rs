@@ -203,11 +203,12 @@ where
         let part = Part { scenario, situation: &situation, emitters: &emitters, focus: &focus, needs };
         let slopes = |values: &Values<T>| weigh.slopes(other, values);
         // The common case with the layout known when it is compiled.
-        if focus.direct == Variables::POSITION && emitters.is_empty() {
+        let is_common = focus.direct == Variables::POSITION && emitters.is_empty();
+        if is_common && !cfg!(feature = "compact") {
             let focus = Focus { direct: Variables::POSITION, emitter: 0, emission: Variables::POSITION };
             Part { focus: &focus, emitters: &[], ..part }.add(&mut sum, slopes, scratch);
         } else {
-            part.add_any(&mut sum, slopes, scratch);
+            part.add_any(&mut sum, &slopes, scratch);
         }
     }
     sum.mirrored()
@@ -223,11 +224,12 @@ struct Part<'a, T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
+    /// Compiled once, whatever the slopes.
     #[inline(never)]
     fn add_any<const M: usize>(
         &self,
         sum: &mut Jet<T, M>,
-        slopes: impl Fn(&Values<T>) -> Slopes<T>,
+        slopes: &dyn Fn(&Values<T>) -> Slopes<T>,
         scratch: &mut [Sample<T, DIM>],
     ) {
         self.add(sum, slopes, scratch);

@@ -181,27 +181,8 @@ impl<T: Real, const DIM: usize, const SENSORS: usize, const AGENTS: usize, const
     /// error, a goal that is too far for `time.max`, lists longer than the capacities.
     pub fn new(draft: &Draft<'_, T, DIM>) -> Result<Self, Error> {
         validate::check(draft)?;
-        let mut knots = Vec::new();
-        let mut sensors = Vec::new();
-        for (index, sensor) in draft.sensors.iter().enumerate() {
-            let item = Item::Sensor(index);
-            let motion = match sensor.motion {
-                Motion::Fixed(position) => StoredMotion::Fixed(position),
-                Motion::Track(entries) => {
-                    let first = knots.len();
-                    knots.extend_from_slice(entries).map_err(|_| {
-                        let total = total_knots(draft.sensors);
-                        Error::new(item, "track", Fault::TooMany { count: total, capacity: KNOTS })
-                    })?;
-                    StoredMotion::Track { first, count: entries.len() }
-                }
-                Motion::Steady(sighting) => StoredMotion::Steady(sighting),
-            };
-            let stored =
-                StoredSensor { motion, ranging: sensor.ranging, detection: sensor.detection, jam: sensor.jam };
-            sensors.push(stored).map_err(|_| too_many("sensor", draft.sensors.len(), SENSORS))?;
-        }
-        Ok(Self {
+        // Filled in place: on a small stack a copy of all lists counts.
+        let mut made = Self {
             frame: Frame {
                 softening: draft.softening,
                 reference_point: draft.reference_point,
@@ -213,13 +194,42 @@ impl<T: Real, const DIM: usize, const SENSORS: usize, const AGENTS: usize, const
                 domain: draft.domain,
                 separation: draft.separation,
             },
-            agents: copied("agent", draft.agents)?,
-            sensors,
-            knots,
-            terms: copied("objective.term", draft.terms)?,
-            regions: copied("region", draft.regions)?,
-            limits: copied("limit", draft.limits)?,
-        })
+            agents: Vec::new(),
+            sensors: Vec::new(),
+            knots: Vec::new(),
+            terms: Vec::new(),
+            regions: Vec::new(),
+            limits: Vec::new(),
+        };
+        made.store_sensors(draft.sensors)?;
+        copy("agent", draft.agents, &mut made.agents)?;
+        copy("objective.term", draft.terms, &mut made.terms)?;
+        copy("region", draft.regions, &mut made.regions)?;
+        copy("limit", draft.limits, &mut made.limits)?;
+        Ok(made)
+    }
+
+    /// Sensors, and their tracks one after the other.
+    fn store_sensors(&mut self, sensors: &[Sensor<'_, T, DIM>]) -> Result<(), Error> {
+        for (index, sensor) in sensors.iter().enumerate() {
+            let motion = match sensor.motion {
+                Motion::Fixed(position) => StoredMotion::Fixed(position),
+                Motion::Track(entries) => {
+                    let first = self.knots.len();
+                    self.knots.extend_from_slice(entries).map_err(|_| {
+                        let total = total_knots(sensors);
+                        let fault = Fault::TooMany { count: total, capacity: KNOTS };
+                        Error::new(Item::Sensor(index), "track", fault)
+                    })?;
+                    StoredMotion::Track { first, count: entries.len() }
+                }
+                Motion::Steady(sighting) => StoredMotion::Steady(sighting),
+            };
+            let stored =
+                StoredSensor { motion, ranging: sensor.ranging, detection: sensor.detection, jam: sensor.jam };
+            self.sensors.push(stored).map_err(|_| too_many("sensor", sensors.len(), SENSORS))?;
+        }
+        Ok(())
     }
 
     /// Lends the parts, without their capacities.
@@ -249,8 +259,12 @@ fn too_many(field: &'static str, count: usize, capacity: usize) -> Error {
     Error::new(Item::Scenario, field, Fault::TooMany { count, capacity })
 }
 
-fn copied<V: Clone, const CAPACITY: usize>(field: &'static str, list: &[V]) -> Result<Vec<V, CAPACITY>, Error> {
-    Vec::from_slice(list).map_err(|_| too_many(field, list.len(), CAPACITY))
+fn copy<V: Clone, const CAPACITY: usize>(
+    field: &'static str,
+    list: &[V],
+    into: &mut Vec<V, CAPACITY>,
+) -> Result<(), Error> {
+    into.extend_from_slice(list).map_err(|_| too_many(field, list.len(), CAPACITY))
 }
 
 /// A validated problem on loan from a [`Scenario`].

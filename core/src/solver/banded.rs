@@ -35,8 +35,8 @@ pub(super) struct Factor<T, const NODES: usize> {
 
 impl<T: Real, const NODES: usize> Factor<T, NODES> {
     /// A factor of nothing.
-    pub(super) fn empty() -> Self {
-        let row = Row { one: T::zero(), two: T::zero(), inverse: T::one() };
+    pub(super) const fn empty() -> Self {
+        let row = Row { one: T::ZERO, two: T::ZERO, inverse: T::ZERO };
         Self { rows: [row; NODES], size: 0 }
     }
 
@@ -83,7 +83,8 @@ impl<T: Real, const NODES: usize> Factor<T, NODES> {
         let (mut one, mut two, mut two_next) = (T::zero(), T::zero(), T::zero());
         let used = values.len().min(rows.len());
         let used_values = values.get_mut(..used).unwrap_or_default();
-        for (row, value) in rows.iter().take(used).zip(used_values.iter_mut()).rev() {
+        let used_rows = rows.get(..used).unwrap_or_default();
+        for (row, value) in used_rows.iter().zip(used_values.iter_mut()).rev() {
             *value = *value * row.inverse - below * one - below_two * two;
             (below_two, below) = (below, *value);
             (two, two_next) = (two_next, row.two);

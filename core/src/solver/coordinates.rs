@@ -20,7 +20,7 @@
 //! over all agents + m r^2 + the squares of the controls times [`CONTROL_WEIGHT`], with m = [`Frame::inertia`]: the squared change
 //! of velocity, which makes the rate of descent independent of N.
 
-use crate::math::{Point, Real, norm_squared};
+use crate::math::{Point, Real, norm_squared, origin};
 use crate::scenario::{Agent, BeamPattern, View};
 use crate::trajectory::{Track, Trajectory};
 
@@ -41,9 +41,9 @@ pub(super) struct Iterate<T, const DIM: usize, const NODES: usize, const AGENTS:
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate<T, DIM, NODES, AGENTS> {
-    pub(super) fn zeros() -> Self {
-        let control = [[[T::zero(); NODES]; KINDS]; AGENTS];
-        Self { offset: [[Point::zeros(); NODES]; AGENTS], control, pace: T::zero() }
+    pub(super) const fn zeros() -> Self {
+        let control = [[[T::ZERO; NODES]; KINDS]; AGENTS];
+        Self { offset: [[origin(); NODES]; AGENTS], control, pace: T::ZERO }
     }
 
     /// Makes the ends zero, which a problem with other intervals may have left otherwise.
@@ -121,12 +121,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
     /// Copies the used part.
     pub(super) fn assign(&mut self, from: &Self, frame: &Frame<T, DIM, AGENTS>) {
         for (mine, theirs) in self.interior_mut(frame).zip(from.interior(frame)) {
-            mine.copy_from_slice(theirs);
+            copy(theirs, mine);
         }
         for (slot, _) in frame.equipment() {
-            self.levels_mut(slot, frame.intervals).copy_from_slice(from.levels(slot, frame.intervals));
+            copy(from.levels(slot, frame.intervals), self.levels_mut(slot, frame.intervals));
         }
         self.pace = from.pace;
+    }
+}
+
+/// Copies what is in both, and so has no lengths to disagree about.
+fn copy<V: Copy>(from: &[V], to: &mut [V]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = *from;
     }
 }
 
@@ -280,7 +287,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
         for ((agent, kind), _) in self.equipment() {
             let levels = iterate.levels((agent, kind), self.intervals);
             if let Some(nodes) = trajectory.tracks.get_mut(agent).map(|track| of_track(track, kind)) {
-                nodes.get_mut(1..=self.intervals).unwrap_or_default().copy_from_slice(levels);
+                let nodes = nodes.get_mut(1..=self.intervals).unwrap_or_default().iter_mut();
+                nodes.zip(levels).for_each(|(mine, &level)| *mine = level);
             }
         }
     }
@@ -310,7 +318,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
                 Kind::Dropout => &track.dropout,
             };
             let nodes = nodes.get(1..=self.intervals).unwrap_or_default();
-            iterate.levels_mut((agent, kind), self.intervals).copy_from_slice(nodes);
+            let levels = iterate.levels_mut((agent, kind), self.intervals).iter_mut();
+            levels.zip(nodes).for_each(|(mine, &level)| *mine = level);
         }
     }
 
@@ -342,7 +351,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
         for ((agent, kind), _) in self.equipment() {
             if let Some(nodes) = by_trajectory.tracks.get_mut(agent).map(|track| of_track(track, kind)) {
                 let slopes = nodes.get(1..=self.intervals).unwrap_or_default();
-                gradient.levels_mut((agent, kind), self.intervals).copy_from_slice(slopes);
+                let levels = gradient.levels_mut((agent, kind), self.intervals).iter_mut();
+                levels.zip(slopes).for_each(|(mine, &slope)| *mine = slope);
             }
         }
     }

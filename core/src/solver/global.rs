@@ -1,7 +1,7 @@
 //! The global start: lattice paths, made feasible; the most promising are polished for a few iterations, and the best
 //! of them is left to be polished to the end.
 //!
-//! Limits: [`CANDIDATES`] are polished, for [`POLISH_ITERATIONS`] each. A team is searched agent by agent, each with
+//! Limits: [`CANDIDATES_MAX`] are polished, for [`POLISH_ITERATIONS`] each. A team is searched agent by agent, each with
 //! the others frozen, in every order where it is small and its agents affect each other.
 
 use heapless::Vec;
@@ -20,13 +20,13 @@ use super::projection::Request;
 use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, projected_gradient};
 
 /// Projected-gradient iterations of one candidate.
-const POLISH_ITERATIONS: usize = 12;
+pub(super) const POLISH_ITERATIONS: usize = 12;
 /// Refinement steps of one candidate.
-const POLISH_REFINEMENTS: usize = 10;
-/// Candidates that are polished, of all that are laid.
-const CANDIDATES: usize = 4;
+pub(super) const POLISH_REFINEMENTS: usize = 10;
+/// Candidates that are polished at most, of all that are laid.
+pub(super) const CANDIDATES_MAX: usize = 4;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
-const PROJECTION_STEPS: usize = 300;
+pub(super) const PROJECTION_STEPS: usize = 300;
 const PROJECTION_TOLERANCE: f64 = 1e-3;
 /// Part of the least distance that agents who meet head-on miss.
 const HEAD_ON: f64 = 0.8;
@@ -53,9 +53,12 @@ where
     let mut found = Found { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY };
     let mut candidates = Candidates::<T>::new();
     let mut way = Way::Unknown;
-    let hurried = warm_start::variants(scenario);
+    let mut hurried = warm_start::variants(scenario);
+    hurried.truncate(settings.variants.max(1));
     for order in 0..orders(scenario) {
-        for (number, variant) in hurried.iter().copied().chain(unhurried(scenario)).enumerate() {
+        for (number, variant) in
+            hurried.iter().copied().chain(unhurried(scenario).take(settings.variants)).enumerate()
+        {
             if deadline() || number >= hurried.len() && matches!(way, Way::Open) {
                 break;
             }
@@ -71,7 +74,7 @@ where
     }
     workspace.best.clone_from(&workspace.base);
     compete(scenario, settings, workspace, (&mut found, ledger), deadline);
-    for (_, order, variant) in candidates {
+    for &(_, order, variant) in candidates.iter().take(settings.candidates) {
         let is_laid = !deadline() && lay(scenario, &variant, order, workspace).is_ok();
         if is_laid && project(scenario, settings, workspace, ledger).is_some() {
             core::mem::swap(&mut workspace.best, &mut workspace.trial);
@@ -162,25 +165,39 @@ fn compete<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
 }
 
 /// The most promising candidates, best first: objective as projected, order of the agents, and variant.
-type Candidates<T> = Vec<(T, usize, Variant<T>), CANDIDATES>;
+type Candidates<T> = Vec<(T, usize, Variant<T>), CANDIDATES_MAX>;
 
 /// Keeps a candidate if it is among the best.
 fn enter<T: Real>(candidates: &mut Candidates<T>, candidate: (T, usize, Variant<T>)) {
-    let place = candidates.iter().take_while(|other| other.0 <= candidate.0).count();
-    if place < CANDIDATES {
-        if candidates.is_full() {
-            candidates.pop();
-        }
-        // There is room now.
-        let _ = candidates.insert(place, candidate);
+    if candidates.is_full() && candidates.last().is_some_and(|last| candidate.0 < last.0) {
+        candidates.pop();
     }
+    let _ = candidates.push(candidate);
+    // It sinks to where the better ones end: no place is ever out of bounds.
+    let mut before: Option<&mut (T, usize, Variant<T>)> = None;
+    for here in candidates.iter_mut().rev() {
+        if let Some(last) = before.filter(|last| last.0 < here.0) {
+            core::mem::swap(last, here);
+        }
+        before = Some(here);
+    }
+}
+
+/// Orders of so many agents to try at most.
+pub(super) const fn orders_max(agents: usize) -> usize {
+    let (mut orders, mut agent) = (1, 2);
+    while agent <= agents && agents <= ORDERED_MAX {
+        orders *= agent;
+        agent += 1;
+    }
+    orders
 }
 
 /// Orders of the agents to try.
 fn orders<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> usize {
     let agents = scenario.agents.len();
     let has_jammers = scenario.agents.iter().any(|agent| agent.jammer.is_some());
-    if has_jammers && agents <= ORDERED_MAX { (1..=agents).product() } else { 1 }
+    if has_jammers { orders_max(agents) } else { 1 }
 }
 
 /// Lattice paths of all agents, one after the other, into `workspace.trial`.

@@ -22,11 +22,13 @@
 //! - `guard`: regions, separations and limits, which are not convex, as barriers and penalties.
 //! - `refine`: a primal-dual interior point method with banded systems, from where the gradient leaves off.
 //! - `obstacle`: what stands in the way where no feasible plan is found.
+//! - `bounds`: the most that a plan takes, from the settings alone.
 //! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
 //!
 //! Limits: one basin from [`Start::Straight`] or [`Start::Given`]; the best of a few from [`Start::Global`].
 
 mod banded;
+mod bounds;
 mod controls;
 mod coordinates;
 mod feasible;
@@ -40,6 +42,7 @@ mod settings;
 mod start;
 mod workspace;
 
+pub use bounds::Bounds;
 pub use obstacle::{Extent, Obstacle};
 pub use settings::Settings;
 pub use start::Start;
@@ -192,7 +195,7 @@ where
 {
     let status = projected_gradient::descend(scenario, settings, workspace, ledger, deadline);
     let may_refine = !matches!(status, Status::Deadline | Status::Infeasible | Status::NonFinite);
-    if may_refine && settings.refinements > 0 {
+    if may_refine && settings.refinements > 0 && !cfg!(feature = "first-order") {
         return refine::polish(scenario, settings, workspace, ledger, deadline).unwrap_or(status);
     }
     status

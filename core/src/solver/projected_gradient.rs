@@ -24,6 +24,8 @@ const MEMORY: usize = 8;
 const SUFFICIENT: f64 = 1e-4;
 /// Sharpness of worst-case terms by stage, over the spread of the metric along the first path.
 const SHARPNESS: [f64; 4] = [10.0, 50.0, 250.0, 1250.0];
+/// Stages of one descent, that which leads clear of regions and limits aside.
+pub(super) const STAGES_MAX: usize = SHARPNESS.len();
 /// Weight of the barriers by stage, over the objective.
 const BARRIER: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// Slack of regions and limits that a restored start has.

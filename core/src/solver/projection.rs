@@ -14,7 +14,7 @@
 //!
 //! Limits: [`super::Settings::projection_steps`] bounds the steps of one call.
 
-use crate::math::{Point, Real, norm_squared};
+use crate::math::{Point, Real, norm_squared, origin};
 use crate::scenario::Domain;
 
 use super::banded::{Coefficients, Factor};
@@ -43,8 +43,8 @@ struct Copied<T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> Copied<T, DIM> {
-    fn zeros() -> Self {
-        Self { inside: Point::zeros(), multiplier: Point::zeros() }
+    const fn zeros() -> Self {
+        Self { inside: origin(), multiplier: origin() }
     }
 
     /// What pulls at the quantity.
@@ -124,6 +124,13 @@ struct Copies<T, const DIM: usize, const NODES: usize> {
     place: [Copied<T, DIM>; NODES],
 }
 
+impl<T: Real, const DIM: usize, const NODES: usize> Copies<T, DIM, NODES> {
+    const fn zeros() -> Self {
+        let none = Copied::zeros();
+        Self { step: [none; NODES], bend: [none; NODES], place: [none; NODES] }
+    }
+}
+
 /// The state of the projection, kept between calls.
 #[derive(Clone, Debug)]
 pub(super) struct Projection<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
@@ -153,15 +160,13 @@ pub(super) struct Request<'a, T, const DIM: usize, const AGENTS: usize> {
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Projection<T, DIM, NODES, AGENTS> {
-    pub(super) fn empty() -> Self {
-        let none = Copied::zeros();
-        let copies = Copies { step: [none; NODES], bend: [none; NODES], place: [none; NODES] };
+    pub(super) const fn empty() -> Self {
         Self {
-            copies: core::array::from_fn(|_| copies.clone()),
-            budgets: [[PaceCopy { inside: T::one(), multiplier: T::zero() }; KINDS]; AGENTS],
+            copies: [const { Copies::zeros() }; AGENTS],
+            budgets: [[PaceCopy { inside: T::ZERO, multiplier: T::ZERO }; KINDS]; AGENTS],
             factor: [Factor::empty(), Factor::empty()],
-            penalty: T::one(),
-            last_step: T::zero(),
+            penalty: T::ZERO,
+            last_step: T::ZERO,
         }
     }
 

@@ -1,10 +1,17 @@
 //! How long and how precisely to plan.
 
 use crate::math::Real;
+use crate::warm_start::VARIANTS_MAX;
+
+use super::global::CANDIDATES_MAX;
 
 /// Bounds on the planner's work. Iteration counts, not clocks: the same settings give the same plan everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings<T> {
+    /// Largest number of lattice searches of [`super::Start::Global`] for each penalty on lateness; at least one is made.
+    pub variants: usize,
+    /// Largest number of lattice paths that [`super::Start::Global`] polishes, besides the straight line.
+    pub candidates: usize,
     /// Largest number of projected-gradient iterations, over all smoothing stages.
     pub iterations: usize,
     /// Largest number of steps of the second-order refinement; 0 leaves the projected gradient alone.
@@ -19,10 +26,29 @@ pub struct Settings<T> {
     pub margin: T,
 }
 
+impl<T: Real> Settings<T> {
+    /// Little work, for a microcontroller: two lattice searches, the better of which is polished, a tenth of the default
+    /// iterations or fewer, and a coarse end.
+    #[must_use]
+    pub fn frugal() -> Self {
+        Self {
+            variants: 2,
+            candidates: 1,
+            iterations: 40,
+            refinements: 6,
+            projection_steps: 40,
+            tolerance: T::real(1e-3),
+            ..Self::default()
+        }
+    }
+}
+
 impl<T: Real> Default for Settings<T> {
     /// Enough for the published scenarios to come to rest.
     fn default() -> Self {
         Self {
+            variants: VARIANTS_MAX,
+            candidates: CANDIDATES_MAX,
             iterations: 600,
             refinements: 120,
             projection_steps: 200,

@@ -10,9 +10,9 @@ use super::projection::Projection;
 use super::refine::Refinement;
 
 /// Cells of the global start's lattice.
-pub const LATTICE_CELLS: usize = 1024;
+pub const LATTICE_CELLS: usize = if cfg!(feature = "compact") { 400 } else { 1024 };
 /// Entries of the lattice's parents: one a cell and slice of time.
-pub const LATTICE_PARENTS: usize = 16 * LATTICE_CELLS;
+pub const LATTICE_PARENTS: usize = if cfg!(feature = "compact") { 12 } else { 16 } * LATTICE_CELLS;
 
 /// Memory for planning `AGENTS` agents over `NODES` nodes among `SENSORS` sensors.
 ///
@@ -41,9 +41,9 @@ pub struct Workspace<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>
     Workspace<T, DIM, NODES, SENSORS, AGENTS>
 {
-    /// A workspace that holds no plan.
+    /// A workspace that holds no plan: all zeros, so that a static one takes no room in an image.
     #[must_use]
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Self {
             best: Trajectory::empty(),
             trial: Trajectory::empty(),
@@ -59,7 +59,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
             base: Trajectory::empty(),
             champion: Trajectory::empty(),
             lattice: Lattice::new(),
-            scratch: core::array::from_fn(|_| Sample::default()),
+            scratch: [const { Sample::zeros() }; SENSORS],
         }
     }
 

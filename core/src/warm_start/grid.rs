@@ -176,7 +176,7 @@ pub(super) struct Moves {
 }
 
 impl Moves {
-    pub(super) fn none() -> Self {
+    pub(super) const fn none() -> Self {
         Self { list: [STAY; MOVES_MAX], count: 0 }
     }
 

@@ -131,12 +131,12 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
             (4.5, 1.25, at(0.8)),
         ]
     };
-    let all = list.iter().map(|&(reach, inflation, duration)| Variant {
-        reach: T::real(reach),
-        inflation: T::real(inflation),
-        duration,
-    });
-    all.take(VARIANTS_MAX).collect()
+    let mut all = Vec::new();
+    for (reach, inflation, duration) in list {
+        // There is room for as many as are listed.
+        let _ = all.push(Variant { reach: T::real(reach), inflation: T::real(inflation), duration });
+    }
+    all
 }
 
 /// Finds the cheapest lattice path of `agent` and writes it, at equal times, to its track in `trajectory`, with the
@@ -203,8 +203,8 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, C
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENTS> {
     /// Empty memory.
     #[must_use]
-    pub fn new() -> Self {
-        let zero = [T::zero(); CELLS];
+    pub const fn new() -> Self {
+        let zero = [T::ZERO; CELLS];
         Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none() }
     }
 

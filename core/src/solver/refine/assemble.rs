@@ -20,7 +20,7 @@ use crate::trajectory::Trajectory;
 use super::barrier::{Multipliers, for_each_wall};
 use super::extremes::Extremes;
 use super::rows::{Ball, for_each_ball, index};
-use super::system::{BUDGETS, EXTREMES, PACE, System};
+use super::system::{BUDGETS, COLUMNS, EXTREMES, PACE, System};
 
 /// Most variables that a node has: position, the one before, three controls and time, in three dimensions.
 const VARIABLES_MAX: usize = 10;
@@ -117,10 +117,17 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let push = self.barrier / wall.slack;
             let (by_offset, by_pace) = (wall.by_offset, wall.by_pace);
             let Some(row) = system.rows.get_mut(wall.node) else { return };
-            row.here[(wall.component, wall.component)] += stiffness;
-            system.columns[PACE].path[wall.node][wall.component] += stiffness * by_offset * by_pace;
+            if let Some(entry) = row.here.get_mut((wall.component, wall.component)) {
+                *entry += stiffness;
+            }
+            let component = |point: Option<&mut Point<T, DIM>>, change: T| {
+                if let Some(component) = point.and_then(|point| point.get_mut(wall.component)) {
+                    *component += change;
+                }
+            };
+            component(system.columns[PACE].path.get_mut(wall.node), stiffness * by_offset * by_pace);
             system.border[PACE][PACE] += stiffness * by_pace * by_pace;
-            system.right.path[wall.node][wall.component] += push * by_offset;
+            component(system.right.path.get_mut(wall.node), push * by_offset);
             system.border_right[PACE] += push * by_pace;
         });
     }
@@ -168,7 +175,10 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
     ) {
         let (variables, roles) = self.variables(agent);
         let at = At { agent_index, agent, node, variables, roles: &roles };
+        // Fewer layouts take less code, and more figures that are zero.
         match roles.len() {
+            0..=4 if cfg!(feature = "compact") => self.node_of::<4>(&at, multipliers, system, scratch),
+            3.. if cfg!(feature = "compact") => self.node_of::<VARIABLES_MAX>(&at, multipliers, system, scratch),
             0..=2 => self.node_of::<2>(&at, multipliers, system, scratch),
             3 => self.node_of::<3>(&at, multipliers, system, scratch),
             4 => self.node_of::<4>(&at, multipliers, system, scratch),
@@ -265,16 +275,19 @@ fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
     system.border_right[PACE] += push * ball.half_slack_by_pace();
     for (a, &weight_a) in ball.weights.iter().enumerate() {
         let Some(row) = index(ball.first, a).filter(|&row| row < interior && weight_a != T::zero()) else { continue };
-        system.columns[PACE].path[row] += along_pace * weight_a;
-        system.right.path[row] -= ball.value * (push * weight_a);
+        let [column, right] = [&mut system.columns[PACE], &mut system.right];
+        let Some((column, right)) = column.path.get_mut(row).zip(right.path.get_mut(row)) else { continue };
+        *column += along_pace * weight_a;
+        *right -= ball.value * (push * weight_a);
         for (b, &weight_b) in ball.weights.iter().enumerate().take(a + 1) {
             if index(ball.first, b).is_none() {
                 continue;
             }
-            let entry = match (a - b, &mut system.rows[row]) {
-                (0, row) => &mut row.here,
-                (1, row) => &mut row.one,
-                (_, row) => &mut row.two,
+            let Some(row) = system.rows.get_mut(row) else { continue };
+            let entry = match a - b {
+                0 => &mut row.here,
+                1 => &mut row.one,
+                _ => &mut row.two,
             };
             *entry += bend * (weight_a * weight_b);
         }
@@ -392,6 +405,8 @@ impl<'a, T: Real> Place<'a, T> {
         column: usize,
         system: &mut System<T, DIM, NODES>,
     ) {
+        // Worst values have columns of their own, so that there is one.
+        let column = column.min(COLUMNS - 1);
         let (stiffness, push) = (multiplier / slack, barrier / slack);
         let mut outer = *jet;
         for a in 0..M {
@@ -425,20 +440,29 @@ impl<'a, T: Real> Place<'a, T> {
     ) {
         let here = self.index < self.interior;
         let before = self.index.checked_sub(1);
-        match (role, other) {
-            (Role::Here(a), Role::Here(b)) if here => system.rows[self.index].here[(a, b)] += value,
+        let row = system.rows.get_mut(self.index);
+        let local = system.local.get_mut(self.index);
+        let entry = match (role, other) {
+            (Role::Here(a), Role::Here(b)) if here => row.and_then(|row| row.here.get_mut((a, b))),
             (Role::Here(a), Role::Before(b)) if here && before.is_some() => {
-                system.rows[self.index].one[(a, b)] += value;
+                row.and_then(|row| row.one.get_mut((a, b)))
             }
             (Role::Before(a), Role::Before(b)) => {
-                if let Some(before) = before {
-                    system.rows[before].here[(a, b)] += value;
-                }
+                before.and_then(|before| system.rows.get_mut(before)).and_then(|row| row.here.get_mut((a, b)))
             }
-            (Role::Control(a), Role::Control(b)) => system.local[self.index].matrix[a][b] += value,
-            (Role::Control(a), Role::Here(b)) if here => system.local[self.index].here[a][b] += value,
-            (Role::Control(a), Role::Before(b)) if before.is_some() => system.local[self.index].before[a][b] += value,
-            _ => {}
+            (Role::Control(a), Role::Control(b)) => {
+                local.and_then(|local| local.matrix.get_mut(a)).and_then(|matrix| matrix.get_mut(b))
+            }
+            (Role::Control(a), Role::Here(b)) if here => {
+                local.and_then(|local| local.here.get_mut(a)).and_then(|point| point.get_mut(b))
+            }
+            (Role::Control(a), Role::Before(b)) if before.is_some() => {
+                local.and_then(|local| local.before.get_mut(a)).and_then(|point| point.get_mut(b))
+            }
+            _ => None,
+        };
+        if let Some(entry) = entry {
+            *entry += value;
         }
     }
 
@@ -449,7 +473,9 @@ impl<'a, T: Real> Place<'a, T> {
         value: T,
         system: &mut System<T, DIM, NODES>,
     ) {
-        add_to_part(self, role, value, &mut system.columns[column]);
+        if let Some(part) = system.columns.get_mut(column) {
+            add_to_part(self, role, value, part);
+        }
     }
 
     fn add_to_right<const DIM: usize, const NODES: usize>(
@@ -468,15 +494,19 @@ fn add_to_part<T: Real, const DIM: usize, const NODES: usize>(
     value: T,
     part: &mut super::system::Part<T, DIM, NODES>,
 ) {
-    match role {
-        Role::Here(component) if place.index < place.interior => part.path[place.index][component] += value,
-        Role::Before(component) => {
-            if let Some(before) = place.index.checked_sub(1) {
-                part.path[before][component] += value;
-            }
+    let entry = match role {
+        Role::Here(component) if place.index < place.interior => {
+            part.path.get_mut(place.index).and_then(|point| point.get_mut(component))
         }
-        Role::Control(kind) => part.control[place.index][kind] += value,
-        _ => {}
+        Role::Before(component) => {
+            let before = place.index.checked_sub(1);
+            before.and_then(|before| part.path.get_mut(before)).and_then(|point| point.get_mut(component))
+        }
+        Role::Control(kind) => part.control.get_mut(place.index).and_then(|kinds| kinds.get_mut(kind)),
+        _ => None,
+    };
+    if let Some(entry) = entry {
+        *entry += value;
     }
 }
 
@@ -552,15 +582,16 @@ pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
     let before = if node >= 1 { moved(node - 1) } else { zero };
     let by_pace = by_from.dot(&before) + by_to.dot(&moved(node));
     let (a, b) = (by_from * scale, by_to * scale);
-    if let Some(from) = from {
-        system.rows[from].here += a * a.transpose() * stiffness;
-        system.columns[PACE].path[from] += a * (stiffness * by_pace);
+    let column = &mut system.columns[PACE].path;
+    if let Some((row, border)) = from.and_then(|from| system.rows.get_mut(from).zip(column.get_mut(from))) {
+        row.here += a * a.transpose() * stiffness;
+        *border += a * (stiffness * by_pace);
     }
-    if let Some(to) = to {
-        system.rows[to].here += b * b.transpose() * stiffness;
-        system.columns[PACE].path[to] += b * (stiffness * by_pace);
+    if let Some((row, border)) = to.and_then(|to| system.rows.get_mut(to).zip(column.get_mut(to))) {
+        row.here += b * b.transpose() * stiffness;
+        *border += b * (stiffness * by_pace);
         if from.is_some() {
-            system.rows[to].one += b * a.transpose() * stiffness;
+            row.one += b * a.transpose() * stiffness;
         }
     }
     system.border[PACE][PACE] += stiffness * by_pace * by_pace;

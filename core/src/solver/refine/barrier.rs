@@ -7,7 +7,7 @@
 //!
 //! Regions, separations and limits have their barrier in [`crate::solver::guard`].
 
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, origin};
 use crate::scenario::Domain;
 use crate::solver::controls::{Bound, KINDS};
 use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
@@ -30,13 +30,13 @@ pub(super) struct Multipliers<T, const DIM: usize, const NODES: usize> {
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize> Multipliers<T, DIM, NODES> {
-    pub(super) fn zeros() -> Self {
-        let none = [T::zero(); NODES];
+    pub(super) const fn zeros() -> Self {
+        let none = [T::ZERO; NODES];
         Self {
             ball: [none; 2],
-            place: [[Point::zeros(); NODES]; 2],
+            place: [[origin(); NODES]; 2],
             level: [[none; KINDS]; 2],
-            budget: [T::zero(); KINDS],
+            budget: [T::ZERO; KINDS],
             extreme: [none; EXTREMES_MAX],
         }
     }

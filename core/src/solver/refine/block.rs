@@ -5,7 +5,7 @@
 //!
 //! Limits: `NODES` bounds the number of blocks.
 
-use nalgebra::SMatrix;
+use nalgebra::{ArrayStorage, SMatrix};
 
 use crate::math::{Point, Real};
 
@@ -24,8 +24,9 @@ pub(super) struct BlockRow<T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> BlockRow<T, DIM> {
-    pub(super) fn zeros() -> Self {
-        Self { here: Block::zeros(), one: Block::zeros(), two: Block::zeros() }
+    pub(super) const fn zeros() -> Self {
+        let none = Block::from_array_storage(ArrayStorage([[T::ZERO; DIM]; DIM]));
+        Self { here: none, one: none, two: none }
     }
 }
 

@@ -52,25 +52,28 @@ const TO_BOUNDARY: f64 = 0.99;
 /// Part of the predicted decrease that a step must bring.
 const SUFFICIENT: f64 = 1e-4;
 /// Factors tried for the shift of one system.
-const SHIFTS_MAX: usize = 24;
+pub(super) const SHIFTS_MAX: usize = 24;
 /// Halvings of one step.
-const HALVINGS_MAX: usize = 25;
+pub(super) const HALVINGS_MAX: usize = 25;
 /// Multipliers stay within this factor of mu / g.
 const MULTIPLIER_RANGE: f64 = 1e8;
+
+/// One for each agent; none where nothing is refined.
+#[cfg(not(feature = "first-order"))]
+type Each<V, const AGENTS: usize> = [V; AGENTS];
+#[cfg(feature = "first-order")]
+type Each<V, const AGENTS: usize> = [V; 0];
 
 /// Memory of a refinement.
 #[derive(Clone, Debug)]
 pub(super) struct Refinement<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
-    systems: [System<T, DIM, NODES>; AGENTS],
-    multipliers: [Multipliers<T, DIM, NODES>; AGENTS],
+    systems: Each<System<T, DIM, NODES>, AGENTS>,
+    multipliers: Each<Multipliers<T, DIM, NODES>, AGENTS>,
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Refinement<T, DIM, NODES, AGENTS> {
-    pub(super) fn empty() -> Self {
-        Self {
-            systems: core::array::from_fn(|_| System::empty()),
-            multipliers: core::array::from_fn(|_| Multipliers::zeros()),
-        }
+    pub(super) const fn empty() -> Self {
+        Self { systems: [const { System::empty() }; _], multipliers: [const { Multipliers::zeros() }; _] }
     }
 }
 
@@ -187,8 +190,8 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
 }
 
 /// A step of everything that is not in the iterate.
-struct Move<T> {
-    unknowns: Vec<[T; COLUMNS], 32>,
+struct Move<T, const AGENTS: usize> {
+    unknowns: Vec<[T; COLUMNS], AGENTS>,
     /// Predicted change of the merit.
     slope: T,
 }
@@ -283,7 +286,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     fn visit_multipliers<const NODES: usize, const SENSORS: usize>(
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        unknowns: Option<&Vec<[T; COLUMNS], 32>>,
+        unknowns: Option<&Vec<[T; COLUMNS], AGENTS>>,
         update: impl Fn(T, T) -> T,
     ) {
         let Workspace { iterate, candidate, trial, scratch, refinement, .. } = workspace;
@@ -349,7 +352,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
-    ) -> Option<Move<T>> {
+    ) -> Option<Move<T, AGENTS>> {
         self.assemble(workspace);
         let (global_weight, global_right) = self.pace_equation(workspace);
         let smallest = T::real(1e-6) * (T::one() + self.barrier);
@@ -389,12 +392,13 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             used[BUDGETS] = jam;
             used[BUDGETS + 1] = dropout;
             for worst in self.extremes.of(index) {
-                used[EXTREMES + worst.slot] = true;
+                used.iter_mut().skip(EXTREMES + worst.slot).take(1).for_each(|used| *used = true);
             }
             system.clear(self.frame.intervals, controls, used);
             source.fill(index, agent, multipliers, system, scratch);
             for worst in self.extremes.of(index) {
-                system.border_right[EXTREMES + worst.slot] -= worst.weight;
+                let slot = system.border_right.get_mut(EXTREMES + worst.slot);
+                slot.into_iter().for_each(|right| *right -= worst.weight);
             }
         }
         if self.is_guarded {
@@ -435,12 +439,12 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         shift: T,
         (global_weight, global_right): (T, T),
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> Option<Move<T>> {
+    ) -> Option<Move<T, AGENTS>> {
         let Workspace { iterate, candidate, refinement, .. } = workspace;
         let agents = self.frame.agents;
         let mut weight = global_weight + shift * self.frame.inertia;
         let mut right = global_right;
-        let mut reduced = Vec::<_, 32>::new();
+        let mut reduced = Vec::<_, AGENTS>::new();
         for system in refinement.systems.iter_mut().take(agents) {
             if !system.factor(shift) {
                 return None;
@@ -486,7 +490,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     /// Goes along the step as far as bounds and merit allow; returns the share, or `None` if nothing was gained.
     fn advance<const NODES: usize, const SENSORS: usize>(
         &mut self,
-        step: &Move<T>,
+        step: &Move<T, AGENTS>,
         merit: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,

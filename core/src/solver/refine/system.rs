@@ -14,7 +14,7 @@
 
 #![expect(clippy::needless_range_loop, reason = "rows and columns by the letters of the equations")]
 
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, origin};
 use crate::solver::controls::KINDS;
 
 use super::block::{self, BlockRow};
@@ -40,8 +40,8 @@ pub(super) struct Part<T, const DIM: usize, const NODES: usize> {
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize> Part<T, DIM, NODES> {
-    pub(super) fn zeros() -> Self {
-        Self { path: [Point::zeros(); NODES], control: [[T::zero(); KINDS]; NODES] }
+    pub(super) const fn zeros() -> Self {
+        Self { path: [origin(); NODES], control: [[T::ZERO; KINDS]; NODES] }
     }
 
     fn clear(&mut self, intervals: usize) {
@@ -94,9 +94,9 @@ pub(super) struct Local<T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> Local<T, DIM> {
-    fn zeros() -> Self {
-        let none = [[T::zero(); KINDS]; KINDS];
-        Self { matrix: none, factor: none, here: [Point::zeros(); KINDS], before: [Point::zeros(); KINDS] }
+    const fn zeros() -> Self {
+        let none = [[T::ZERO; KINDS]; KINDS];
+        Self { matrix: none, factor: none, here: [origin(); KINDS], before: [origin(); KINDS] }
     }
 
     /// Factors the matrix with `shift` on the diagonal; false if it is not positive definite. Kinds that do not
@@ -176,17 +176,17 @@ pub(super) struct System<T, const DIM: usize, const NODES: usize> {
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
-    pub(super) fn empty() -> Self {
+    pub(super) const fn empty() -> Self {
         Self {
             rows: [BlockRow::zeros(); NODES],
             factored: [BlockRow::zeros(); NODES],
             local: [Local::zeros(); NODES],
-            columns: core::array::from_fn(|_| Part::zeros()),
-            solved: core::array::from_fn(|_| Part::zeros()),
+            columns: [const { Part::zeros() }; COLUMNS],
+            solved: [const { Part::zeros() }; COLUMNS],
             right: Part::zeros(),
             step: Part::zeros(),
-            border: [[T::zero(); COLUMNS]; COLUMNS],
-            border_right: [T::zero(); COLUMNS],
+            border: [[T::ZERO; COLUMNS]; COLUMNS],
+            border_right: [T::ZERO; COLUMNS],
             used: [false; COLUMNS],
             controls: Controls::None,
             intervals: 0,
@@ -283,8 +283,9 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
             if !is_sound {
                 return None;
             }
-            for row in (0..COLUMNS).filter(|&row| row == PACE || row > pivot_index) {
-                if !self.used[row] {
+            for row in 0..COLUMNS {
+                let is_below = row == PACE || row > pivot_index;
+                if !is_below || !self.used[row] {
                     continue;
                 }
                 let share = matrix[row][pivot_index] / pivot;
@@ -307,8 +308,8 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
                 continue;
             }
             let mut rest = reduced.right[row] - reduced.matrix[row][PACE] * pace;
-            for column in row + 1..COLUMNS {
-                rest -= reduced.matrix[row][column] * unknowns[column];
+            for (&coefficient, &unknown) in reduced.matrix[row].iter().zip(&unknowns).skip(row + 1) {
+                rest -= coefficient * unknown;
             }
             unknowns[row] = rest / reduced.matrix[row][row];
         }
@@ -387,7 +388,7 @@ fn columns_solved<T: Real, const DIM: usize>(
 ) -> [Point<T, DIM>; KINDS] {
     let mut solved = [Point::<T, DIM>::zeros(); KINDS];
     for component in 0..DIM {
-        let values = local.solve(core::array::from_fn(|kind| coupling[kind][component]));
+        let values = local.solve(coupling.each_ref().map(|part| part.get(component).copied().unwrap_or(T::zero())));
         for (kind, value) in values.into_iter().enumerate() {
             solved[kind][component] = value;
         }

@@ -1,0 +1,89 @@
+//! The most that one call of [`super::plan`] does, from its [`Settings`] alone: what a deadline on a microcontroller is
+//! worked out from.
+//!
+//! | start | what is counted |
+//! |---|---|
+//! | straight, given | one descent and one refinement |
+//! | global | a projection a lattice path; a short descent and refinement for each candidate and the straight line; one in full |
+//!
+//! A descent has a stage that leads clear of regions and limits and then all others, each with its iterations; an iteration
+//! is one projection and one line search; a step of the refinement factors until the system is definite, and halves until
+//! the merit falls.
+//!
+//! Limits: the lattice itself is bounded by its cells ([`super::workspace`]) and not counted here; an evaluation visits
+//! every node of every agent once, and each visit every sensor.
+
+use crate::math::Real;
+use crate::warm_start::VARIANTS_MAX;
+
+use super::{Settings, global, projected_gradient, refine};
+
+/// The largest counts that an [`super::Outcome`] can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Bounds {
+    /// Projected-gradient iterations.
+    pub iterations: usize,
+    /// Steps of the second-order refinement.
+    pub refinements: usize,
+    /// Banded systems factored, an agent.
+    pub factorizations: usize,
+    /// Evaluations of the objective, with or without gradient.
+    pub evaluations: usize,
+    /// Steps of the projection.
+    pub projection_steps: usize,
+}
+
+impl<T: Real> Settings<T> {
+    /// The most that a plan from [`super::Start::Straight`] or [`super::Start::Given`] takes.
+    #[must_use]
+    pub const fn bounds_near(&self) -> Bounds {
+        let improved = self.improvement(self.iterations, self.refinements);
+        Bounds { evaluations: improved.evaluations + 1, ..improved }
+    }
+
+    /// The most that a plan from [`super::Start::Global`] for a number of agents takes.
+    #[must_use]
+    pub const fn bounds_everywhere(&self, agents: usize) -> Bounds {
+        let short = self.improvement(
+            smaller(self.iterations, global::POLISH_ITERATIONS),
+            smaller(self.refinements, global::POLISH_REFINEMENTS),
+        );
+        let long = self.improvement(self.iterations, self.refinements);
+        let candidates = smaller(self.candidates, global::CANDIDATES_MAX);
+        let hurried = smaller(if self.variants == 0 { 1 } else { self.variants }, VARIANTS_MAX);
+        let unhurried = smaller(self.variants, VARIANTS_MAX);
+        let laid = global::orders_max(agents) * (hurried + unhurried) + candidates;
+        let polished = candidates + 1;
+        Bounds {
+            iterations: polished * short.iterations + long.iterations,
+            refinements: polished * short.refinements + long.refinements,
+            factorizations: polished * short.factorizations + long.factorizations,
+            evaluations: 1 + laid + polished * short.evaluations + long.evaluations,
+            projection_steps: laid * global::PROJECTION_STEPS
+                + polished * short.projection_steps
+                + long.projection_steps,
+        }
+    }
+
+    /// A descent and a refinement.
+    const fn improvement(&self, iterations: usize, refinements: usize) -> Bounds {
+        // Clear of what is in the way first, then through all stages.
+        let descended = 2 * iterations;
+        Bounds {
+            iterations: descended,
+            refinements,
+            factorizations: refinements * refine::SHIFTS_MAX,
+            // Its value, the first gradient of every stage, then a line search each, and each success judged exactly.
+            evaluations: 1
+                + (1 + projected_gradient::STAGES_MAX)
+                + descended * (self.line_search_steps + 1)
+                + refinements * (1 + refine::HALVINGS_MAX + 1),
+            projection_steps: descended * self.projection_steps,
+        }
+    }
+}
+
+const fn smaller(a: usize, b: usize) -> usize {
+    if a < b { a } else { b }
+}
