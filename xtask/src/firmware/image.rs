@@ -1,12 +1,11 @@
 //! An image: built by cargo, run by QEMU, its log decoded.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use defmt_decoder::{DecodeError, Table};
 
 use super::parts::Part;
 use super::tools::TARGET;
@@ -86,7 +85,7 @@ pub fn on_host(part: &Part, top: &Path) -> anyhow::Result<Vec<String>> {
 pub fn run(part: &Part, name: &str, top: &Path) -> anyhow::Result<Vec<String>> {
     let path = path(part, name, top);
     let (is_good, log) = output(part, &path)?;
-    let lines = decode(&path, &log)?;
+    let lines = decode(&path, &log, top)?;
     if !is_good {
         bail!("the image {name} failed on the {}; it said:\n{}", part.name, lines.join("\n"));
     }
@@ -167,21 +166,23 @@ pub fn number_after(line: &str, word: &str) -> anyhow::Result<u64> {
 }
 
 /// The messages of a log, by the strings that the image keeps.
-fn decode(image: &Path, log: &[u8]) -> anyhow::Result<Vec<String>> {
-    let elf = std::fs::read(image).with_context(|| format!("cannot read {}", image.display()))?;
-    let table = Table::parse(&elf)?.context("the image has no log strings")?;
-    let mut decoder = table.new_stream_decoder();
-    decoder.received(log);
-    let mut lines = Vec::new();
-    loop {
-        match decoder.decode() {
-            Ok(frame) => lines.push(frame.display_message().to_string()),
-            Err(DecodeError::UnexpectedEof) => return Ok(lines),
-            Err(DecodeError::Malformed) => {
-                bail!("the log is not what the image's strings say, after {} lines", lines.len())
-            }
-        }
+fn decode(image: &Path, log: &[u8], top: &Path) -> anyhow::Result<Vec<String>> {
+    let mut decoder = cargo(top)
+        .args(["run", "--manifest-path", MANIFEST, "--quiet", "--package", "quietpath-decode", "--"])
+        .arg(image)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("cannot start cargo")?;
+    let mut input = decoder.stdin.take().context("the decoder has an input")?;
+    let log = log.to_vec();
+    let writer = std::thread::spawn(move || input.write_all(&log));
+    let decoded = decoder.wait_with_output()?;
+    let _ = writer.join();
+    if !decoded.status.success() {
+        bail!("the log of {} cannot be decoded", image.display());
     }
+    Ok(String::from_utf8(decoded.stdout)?.lines().map(String::from).collect())
 }
 
 fn cargo(top: &Path) -> Command {
