@@ -69,6 +69,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
         Ok(zeros)
     }
 
+    /// Becomes a copy of another, of the part that is used: capacities may be much larger than the problem.
+    pub(crate) fn assign(&mut self, from: &Self) {
+        (self.intervals, self.agents) = (from.intervals, from.agents);
+        let nodes = self.nodes();
+        copy_used(&from.times, &mut self.times, nodes);
+        for (mine, theirs) in self.active_mut().iter_mut().zip(from.active()) {
+            copy_used(&theirs.path, &mut mine.path, nodes);
+            copy_used(&theirs.jam, &mut mine.jam, nodes);
+            copy_used(&theirs.azimuth, &mut mine.azimuth, nodes);
+            copy_used(&theirs.dropout, &mut mine.dropout, nodes);
+        }
+    }
+
     /// Sets the number of intervals and of agents; entries keep their values.
     ///
     /// # Errors
@@ -209,6 +222,10 @@ pub(crate) fn shift<V: Copy>(list: &mut [V], count: usize) {
     for (to, from) in list.iter().zip(list.iter().skip(count)) {
         to.set(from.get());
     }
+}
+
+fn copy_used<V: Copy>(from: &[V], to: &mut [V], count: usize) {
+    to.iter_mut().zip(from).take(count).for_each(|(to, from)| *to = *from);
 }
 
 fn copy_entry<V: Copy>(from: &[V], at: usize, to: &mut [V], end: usize) {

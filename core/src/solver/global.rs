@@ -4,7 +4,6 @@
 //! Limits: [`CANDIDATES_MAX`] are polished, for [`POLISH_ITERATIONS`] each. A team is searched agent by agent, each with
 //! the others frozen, in every order where it is small and its agents affect each other.
 
-use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::constraints::{Constraint, separation};
@@ -17,7 +16,7 @@ use crate::warm_start::{self, Variant};
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
 use super::projection::Request;
-use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, projected_gradient};
+use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, projected_gradient, refine};
 
 /// Projected-gradient iterations of one candidate.
 pub(super) const POLISH_ITERATIONS: usize = 12;
@@ -25,6 +24,8 @@ pub(super) const POLISH_ITERATIONS: usize = 12;
 pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 4;
+/// Largest distance of two paths that go the same way, over their length.
+const ALIKE: f64 = 0.04;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
 pub(super) const PROJECTION_STEPS: usize = 300;
 const PROJECTION_TOLERANCE: f64 = 1e-3;
@@ -49,9 +50,10 @@ pub(super) fn search<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 where
     T: Real,
 {
-    workspace.base.clone_from(&workspace.best);
-    let mut found = Found { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY };
-    let mut candidates = Candidates::<T>::new();
+    workspace.base.assign(&workspace.best);
+    workspace.lattice.begin();
+    let mut race = Race { scenario, settings, found: Found::nothing(), promise: T::INFINITY, polished: 0 };
+    race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
     hurried.truncate(settings.variants.max(1));
@@ -67,26 +69,42 @@ where
             way = way.after(laid, variant.duration);
             if laid.is_ok()
                 && let Some(objective) = project(scenario, settings, workspace, ledger)
+                && race.admits(objective, workspace)
             {
-                enter(&mut candidates, (objective, order, variant));
+                workspace.best.assign(&workspace.trial);
+                race.run(workspace, ledger, deadline);
             }
         }
     }
-    workspace.best.clone_from(&workspace.base);
-    compete(scenario, settings, workspace, (&mut found, ledger), deadline);
-    for &(_, order, variant) in candidates.iter().take(settings.candidates) {
-        let is_laid = !deadline() && lay(scenario, &variant, order, workspace).is_ok();
-        if is_laid && project(scenario, settings, workspace, ledger).is_some() {
-            core::mem::swap(&mut workspace.best, &mut workspace.trial);
-            compete(scenario, settings, workspace, (&mut found, ledger), deadline);
-        }
-    }
-    workspace.best.clone_from(&workspace.champion);
-    if found.status == Status::Infeasible {
+    workspace.best.assign(&workspace.champion);
+    let Found { status, least, barrier, .. } = race.found;
+    if status == Status::Infeasible {
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
-        return (found.status, closing);
+        return (status, closing);
     }
-    (improve(scenario, settings, workspace, ledger, deadline), None)
+    (ledger.best, ledger.barrier) = (least, barrier);
+    (polish(scenario, settings, workspace, ledger, deadline), None)
+}
+
+/// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
+/// from a lattice path, and led by the projected gradient otherwise.
+fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Status
+where
+    T: Real,
+{
+    if settings.refinements >= POLISH_REFINEMENTS
+        && !cfg!(feature = "first-order")
+        && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
+    {
+        return status;
+    }
+    improve(scenario, settings, workspace, ledger, deadline)
 }
 
 /// Flight times that no penalty on lateness speaks for, up to the last one allowed: where there is no way in time, a late
@@ -105,6 +123,14 @@ struct Found<T> {
     status: Status,
     least: T,
     slack: T,
+    /// Where its refinement goes on.
+    barrier: T,
+}
+
+impl<T: Real> Found<T> {
+    fn nothing() -> Self {
+        Self { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY, barrier: T::zero() }
+    }
 }
 
 /// What the lattice says of the way to the goal.
@@ -135,52 +161,75 @@ impl<T: Real, const DIM: usize> Way<T, DIM> {
     }
 }
 
-/// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
-fn compete<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    settings: &Settings<T>,
-    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    (found, ledger): (&mut Found<T>, &mut Ledger<T>),
-    deadline: &mut dyn FnMut() -> bool,
-) where
-    T: Real,
-{
-    let short = Settings {
-        iterations: settings.iterations.min(POLISH_ITERATIONS),
-        refinements: settings.refinements.min(POLISH_REFINEMENTS),
-        ..*settings
-    };
-    let status = improve(scenario, &short, workspace, ledger, deadline);
-    let is_first = found.least == T::INFINITY;
-    if status != Status::Infeasible && (ledger.best < found.least || is_first) {
-        *found = Found { status, least: ledger.best, slack: T::zero() };
-        workspace.champion.clone_from(&workspace.best);
-    } else if found.status == Status::Infeasible {
-        let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
-        if slack > found.slack {
-            found.slack = slack;
-            workspace.champion.clone_from(&workspace.best);
+/// Candidates, one after the other.
+struct Race<'a, T, const DIM: usize> {
+    scenario: &'a View<'a, T, DIM>,
+    settings: &'a Settings<T>,
+    found: Found<T>,
+    /// Least objective of all that were laid, before they were polished.
+    promise: T,
+    /// Lattice paths polished.
+    polished: usize,
+}
+
+impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
+    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, and does not
+    /// go where the champion goes.
+    fn admits<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        objective: T,
+        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> bool {
+        let is_record = objective < self.promise;
+        self.promise = self.promise.min(objective);
+        let is_known = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
+        let admits = (is_record || self.polished < self.settings.candidates) && !is_known;
+        self.polished += usize::from(admits);
+        admits
+    }
+
+    /// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
+    fn run<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        let Self { scenario, settings, found, .. } = self;
+        let short = Settings {
+            iterations: settings.iterations.min(POLISH_ITERATIONS),
+            refinements: settings.refinements.min(POLISH_REFINEMENTS),
+            ..**settings
+        };
+        ledger.barrier = T::zero();
+        ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
+        ledger.evaluations += 1;
+        let status = polish(scenario, &short, workspace, ledger, deadline);
+        if status != Status::Infeasible && (ledger.best < found.least || found.least == T::INFINITY) {
+            *found = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
+            workspace.champion.assign(&workspace.best);
+        } else if found.status == Status::Infeasible {
+            let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
+            if slack > found.slack {
+                found.slack = slack;
+                workspace.champion.assign(&workspace.best);
+            }
         }
     }
 }
 
-/// The most promising candidates, best first: objective as projected, order of the agents, and variant.
-type Candidates<T> = Vec<(T, usize, Variant<T>), CANDIDATES_MAX>;
-
-/// Keeps a candidate if it is among the best.
-fn enter<T: Real>(candidates: &mut Candidates<T>, candidate: (T, usize, Variant<T>)) {
-    if candidates.is_full() && candidates.last().is_some_and(|last| candidate.0 < last.0) {
-        candidates.pop();
-    }
-    let _ = candidates.push(candidate);
-    // It sinks to where the better ones end: no place is ever out of bounds.
-    let mut before: Option<&mut (T, usize, Variant<T>)> = None;
-    for here in candidates.iter_mut().rev() {
-        if let Some(last) = before.filter(|last| last.0 < here.0) {
-            core::mem::swap(last, here);
-        }
-        before = Some(here);
-    }
+/// Whether two trajectories go the same way, side by side, in about the same time.
+fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    one: &Trajectory<T, DIM, NODES, AGENTS>,
+    other: &Trajectory<T, DIM, NODES, AGENTS>,
+) -> bool {
+    let nodes = one.nodes();
+    one.active().iter().zip(other.active()).all(|(one, other)| {
+        let steps = one.path.iter().zip(one.path.iter().skip(1)).take(nodes - 1);
+        let length = steps.fold(T::zero(), |length, (from, to)| length + norm(&(to - from)));
+        let apart = one.path.iter().zip(&other.path).take(nodes).map(|(one, other)| norm(&(one - other)));
+        apart.fold(T::zero(), T::max) < length * T::real(ALIKE)
+    })
 }
 
 /// Orders of so many agents to try at most.
@@ -208,7 +257,7 @@ fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
 ) -> Result<(), Obstacle<T, DIM>> {
     let Workspace { base, trial, lattice, scratch, .. } = workspace;
-    trial.clone_from(base);
+    trial.assign(base);
     let agents = scenario.agents.len();
     for place in 0..agents {
         let agent = at_place(order, place, agents);

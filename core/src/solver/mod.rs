@@ -155,6 +155,7 @@ where
         factorizations: 0,
         evaluations: 1,
         projection_steps: 0,
+        barrier: T::zero(),
         keeps: Keeps::Better,
     };
     let (status, closing) = if !first.finite() {
@@ -209,6 +210,8 @@ struct Ledger<T> {
     factorizations: usize,
     evaluations: usize,
     projection_steps: usize,
+    /// Barrier parameter that the last refinement ended with, where the incumbent is the plan it ended with; 0 otherwise.
+    barrier: T,
     keeps: Keeps,
 }
 

@@ -58,8 +58,8 @@ where
 {
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
     frame.collapse(&workspace.best, &mut workspace.iterate);
-    workspace.trial.clone_from(&workspace.best);
-    workspace.by_trajectory.clone_from(&workspace.best);
+    workspace.trial.assign(&workspace.best);
+    workspace.by_trajectory.assign(&workspace.best);
     workspace.anchor.assign(&workspace.iterate, &frame);
     lay_anchor(scenario, &frame, &mut workspace.anchor);
     workspace.projection.prepare(&frame);
@@ -276,8 +276,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Descent<'_, T, DIM, AGENTS>
             };
             failures = 0;
             step = self.spectral_step(first_step, step, workspace);
-            core::mem::swap(&mut workspace.iterate, &mut workspace.next);
-            core::mem::swap(&mut workspace.gradient, &mut workspace.gradient_next);
+            workspace.iterate.assign(&workspace.next, self.frame);
+            workspace.gradient.assign(&workspace.gradient_next, self.frame);
             value = found;
             history.push(value);
         }
@@ -344,7 +344,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Descent<'_, T, DIM, AGENTS>
             let (from, share) = if around > T::real(0.9) { (&*anchor, around) } else { (&*iterate, direct) };
             kept = share;
             next.between(from, candidate, share, self.frame);
-            core::mem::swap(next, candidate);
+            candidate.assign(next, self.frame);
         }
         (gradient.slope(iterate, candidate, self.frame), kept)
     }
@@ -397,7 +397,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Descent<'_, T, DIM, AGENTS>
         };
         if exact < ledger.best {
             ledger.best = exact;
-            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+            workspace.best.assign(&workspace.trial);
         }
     }
 

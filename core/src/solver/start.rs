@@ -85,13 +85,13 @@ where
     if let Start::Given(given) = start {
         let fits = given.intervals() == scenario.frame.intervals && given.agents() == scenario.agents.len();
         if fits && bounds_excess(scenario, given, &mut workspace.scratch) <= T::real(constraints::TOLERANCE) {
-            workspace.best.clone_from(given);
+            workspace.best.assign(given);
             return Ok(());
         }
         if fits && has_velocity {
-            workspace.trial.clone_from(given);
+            workspace.trial.assign(given);
             if bring_within(scenario, settings, given.duration().min(allowed), workspace) {
-                core::mem::swap(&mut workspace.best, &mut workspace.trial);
+                workspace.best.assign(&workspace.trial);
                 return Ok(());
             }
         }
@@ -107,7 +107,7 @@ where
         let duration = (shortest * T::real(stretch)).min(allowed);
         workspace.trial = Trajectory::straight(scenario, duration)?;
         if bring_within(scenario, settings, duration, workspace) {
-            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+            workspace.best.assign(&workspace.trial);
             lay_controls(scenario, &mut workspace.best);
             return Ok(());
         }

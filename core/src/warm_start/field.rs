@@ -58,8 +58,9 @@ pub(super) struct Slice<T, const DIM: usize, const AGENTS: usize> {
     emitters: Vec<Emitter<T, DIM>, AGENTS>,
 }
 
+/// Coefficient of each term, and what they need.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Weights<T> {
+pub(super) struct Weights<T> {
     of_term: [T; TERMS_MAX],
     needs: Needs,
 }
@@ -104,6 +105,16 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         self.scenario.sensors.iter().any(StoredSensor::is_moving)
             || has_others && has_jammers
             || self.scenario.regions.iter().any(|region| region.window != Window::always())
+    }
+
+    /// Whether costs depend on the path before, as those of worst-case terms do.
+    pub(super) fn has_tangents(&self) -> bool {
+        self.scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme)
+    }
+
+    /// Levels of jamming and dropout that last the whole flight.
+    pub(super) fn levels(&self) -> [T; 2] {
+        [self.level, self.dropout]
     }
 
     /// The tangent at the path as it is.
@@ -385,9 +396,9 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Slice<T, DIM, AGENTS> {
         self.time
     }
 
-    /// Whether both slices cost the same, where nothing moves.
-    pub(super) fn costs_as(&self, other: &Self) -> bool {
-        self.own == other.own
+    /// Coefficients of the terms: slices with the same cost the same, where nothing moves.
+    pub(super) fn weights(&self) -> Weights<T> {
+        self.own
     }
 
     /// Whether a region is forbidden at some time of the slice.

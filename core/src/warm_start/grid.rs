@@ -27,7 +27,7 @@ const GROWTHS_MAX: usize = 256;
 pub(super) struct Grid<T, const DIM: usize> {
     low: Point<T, DIM>,
     pub(super) pitch: Point<T, DIM>,
-    counts: [usize; DIM],
+    pub(super) counts: [usize; DIM],
 }
 
 impl<T: Real, const DIM: usize> Grid<T, DIM> {
@@ -76,6 +76,14 @@ impl<T: Real, const DIM: usize> Grid<T, DIM> {
         self.counts.iter().product()
     }
 
+    /// Lowest corner, then sides of a cell, zeros where there is no such axis.
+    pub(super) fn described(&self) -> [[T; DIM_MAX]; 2] {
+        [self.low, self.pitch].map(|point| {
+            let mut components = point.iter().copied();
+            [(); DIM_MAX].map(|()| components.next().unwrap_or_default())
+        })
+    }
+
     /// Widest side of a cell.
     pub(super) fn size(&self) -> T {
         self.pitch.iter().copied().fold(T::zero(), T::max)
@@ -116,7 +124,7 @@ impl<T: Real, const DIM: usize> Grid<T, DIM> {
         self.center(&self.coordinates(cell))
     }
 
-    fn coordinates(&self, cell: usize) -> [usize; DIM] {
+    pub(super) fn coordinates(&self, cell: usize) -> [usize; DIM] {
         let mut rest = cell;
         self.counts.map(|count| {
             let coordinate = rest % count.max(1);
@@ -213,20 +221,15 @@ impl Moves {
         }
     }
 
-    /// Moves that end in the cell `to` at coordinates `at`: number, cell that they come from, and move.
-    pub(super) fn arriving<'a, T: Real, const DIM: usize>(
-        &'a self,
-        grid: &'a Grid<T, DIM>,
-        (to, at): (usize, [usize; DIM]),
-    ) -> impl Iterator<Item = (u8, usize, &'a Move)> {
-        (0..=u8::MAX).zip(self.list.iter().take(self.count)).filter_map(move |(number, step)| {
-            for ((&cells, &coordinate), &count) in step.offset.iter().zip(&at).zip(&grid.counts) {
-                if coordinate.wrapping_add_signed(-isize::from(cells)) >= count {
-                    return None;
-                }
-            }
-            Some((number, step.origin(to), step))
-        })
+    /// The most cells that a move goes along an axis.
+    pub(super) fn farthest(&self) -> usize {
+        let cells = |step: &Move| step.offset.iter().map(|cells| usize::from(cells.unsigned_abs())).max();
+        self.all().iter().filter_map(cells).max().unwrap_or(0)
+    }
+
+    /// The moves.
+    pub(super) fn all(&self) -> &[Move] {
+        self.list.get(..self.count).unwrap_or_default()
     }
 
     /// Where the move of that number into `to` comes from.
@@ -256,17 +259,18 @@ impl Move {
         Self { offset: *offset, jump: flat(1.0), back, between }
     }
 
-    fn origin(&self, to: usize) -> usize {
+    /// The cell that the move into `to` comes from.
+    pub(super) fn origin(&self, to: usize) -> usize {
         to.wrapping_add_signed(-isize::from(self.jump))
     }
 
-    /// Mean of `landscape` along the move from cell `from` to cell `to`, by the trapezoidal rule.
-    pub(super) fn mean<T: Real>(&self, landscape: &[T], from: usize, to: usize) -> T {
-        let at = |cell: usize| landscape.get(cell).copied().unwrap_or(T::INFINITY);
-        let mut sum = (at(from) + at(to)) * T::real(0.5);
-        for &back in self.back.iter().take(usize::from(self.between)) {
-            sum += at(to.wrapping_add_signed(isize::from(back)));
-        }
-        sum / T::from_count(usize::from(self.between) + 1)
+    /// Cells by axis.
+    pub(super) fn offset(&self) -> &[i8; DIM_MAX] {
+        &self.offset
+    }
+
+    /// Changes of the cell's number back from the end to each of the cells between.
+    pub(super) fn between(&self) -> impl Iterator<Item = isize> {
+        self.back.iter().take(usize::from(self.between)).map(|&back| isize::from(back))
     }
 }

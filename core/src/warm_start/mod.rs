@@ -28,6 +28,7 @@
 mod field;
 mod grid;
 mod obstruction;
+mod sweep;
 
 use heapless::Vec;
 
@@ -36,9 +37,10 @@ use crate::metrics::Sample;
 use crate::scenario::{Reduce, View};
 use crate::trajectory::Trajectory;
 
-use field::{Field, SHARPNESS, Slice};
+use field::{Field, SHARPNESS, Slice, Weights};
 use grid::{Grid, Moves};
 use obstruction::{first_blocked, first_crossed};
+use sweep::{Block, Sweep};
 
 pub use obstruction::{Blocked, Obstruction};
 
@@ -60,6 +62,8 @@ pub struct Variant<T> {
     pub inflation: T,
     /// Flight time, s.
     pub duration: T,
+    /// Flight time that the grid is laid for, s: variants that share one share its costs.
+    pub span: T,
 }
 
 /// How blocked cells are told from free ones.
@@ -81,6 +85,19 @@ pub struct Lattice<T, const CELLS: usize, const PARENTS: usize> {
     next: [T; CELLS],
     parents: [u8; PARENTS],
     moves: Moves,
+    /// What the landscape is of.
+    surveyed: Option<Survey<T>>,
+}
+
+/// What a landscape that does not change with time depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Survey<T> {
+    agent: usize,
+    caution: Caution,
+    /// Lowest corner, then sides of a cell.
+    grid: [[T; 3]; 2],
+    equipment: [T; 2],
+    weights: Weights<T>,
 }
 
 /// Grid, slices and reach of one search.
@@ -92,6 +109,8 @@ struct Plan<T, const DIM: usize> {
     reach: T,
     /// Length of a slice, s.
     interval: T,
+    /// Longest way that any variant on this grid goes, length units.
+    farthest: T,
 }
 
 /// A few searches that differ in what a lattice gets wrong, and in flight time where that is free.
@@ -132,9 +151,10 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
         ]
     };
     let mut all = Vec::new();
+    let span = list.iter().fold(T::zero(), |span, &(_, _, duration)| span.max(duration));
     for (reach, inflation, duration) in list {
         // There is room for as many as are listed.
-        let _ = all.push(Variant { reach: T::real(reach), inflation: T::real(inflation), duration });
+        let _ = all.push(Variant { reach: T::real(reach), inflation: T::real(inflation), duration, span });
     }
     all
 }
@@ -205,7 +225,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
     #[must_use]
     pub const fn new() -> Self {
         let zero = [T::ZERO; CELLS];
-        Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none() }
+        Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none(), surveyed: None }
     }
 
     /// One search; the path goes to the trajectory.
@@ -228,6 +248,11 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         Ok(cost)
     }
 
+    /// Forgets the landscape, which belongs to a scenario.
+    pub(crate) fn begin(&mut self) {
+        self.surveyed = None;
+    }
+
     /// All slices; the least cost and the last cell of its path.
     fn sweep<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
@@ -236,44 +261,64 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         caution: Caution,
         scratch: &mut [Sample<T, DIM>],
     ) -> Option<(T, usize)> {
-        let cells = plan.grid.cells();
+        let (cells, counts) = (plan.grid.cells(), &plan.grid.counts);
         let count = T::from_count(plan.slices);
-        let mut before: Option<Slice<T, DIM, AGENTS>> = None;
+        let (start, goal) = (&field.agent.start, &field.agent.goal);
+        let farthest = self.moves.farthest();
+        let mut alive = plan.grid.around(start, T::zero())?;
         for number in 1..=plan.slices {
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
-            if field.is_moving() || before.as_ref().is_none_or(|before| !slice.costs_as(before)) {
-                self.survey(field, plan, &slice, caution, scratch);
-            }
+            let left = plan.reach * T::from_count(plan.slices - number);
+            let wanted = plan.grid.around(goal, left)?;
+            let reached = alive.grown(if number == 1 { farthest + 1 } else { farthest }, counts);
+            let needed = if number == plan.slices { alive.hull(&wanted) } else { reached };
+            self.survey(field, plan, (&slice, &needed), caution, scratch);
             if number == plan.slices {
                 return self.arrive(field, plan, &slice, caution);
             }
             self.next.iter_mut().take(cells).for_each(|cost| *cost = T::INFINITY);
+            let wanted = wanted.meet(&reached)?;
             if number == 1 {
                 self.depart(field, plan, &slice, caution);
             } else {
-                self.advance(field, plan, (number, &slice), caution);
+                self.advance(field, plan, (number, &slice), (&alive, &wanted), caution);
             }
+            alive = wanted;
             core::mem::swap(&mut self.cost, &mut self.next);
-            before = Some(slice);
         }
         None
     }
 
-    /// Running cost of every cell.
+    /// Running cost of every cell of a block, unless it is known already.
     fn survey<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
         field: &Field<'_, T, DIM, NODES, AGENTS>,
         plan: &Plan<T, DIM>,
-        slice: &Slice<T, DIM, AGENTS>,
+        (slice, needed): (&Slice<T, DIM, AGENTS>, &Block<DIM>),
         caution: Caution,
         scratch: &mut [Sample<T, DIM>],
     ) {
+        let key = Survey {
+            agent: field.index,
+            caution,
+            grid: plan.grid.described(),
+            equipment: field.levels(),
+            weights: slice.weights(),
+        };
+        if self.surveyed == Some(key) {
+            return;
+        }
+        let is_lasting = !field.is_moving() && !field.has_tangents();
+        self.surveyed = is_lasting.then_some(key);
+        let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
-        let farthest = plan.reach * T::from_count(plan.slices);
-        for ((_, center), rate) in plan.grid.iter().zip(&mut self.landscape) {
+        for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape) {
+            if !needed.holds(&at) {
+                continue;
+            }
             let way = norm(&(center - field.agent.start)) + norm(&(field.agent.goal - center));
-            *rate = if way > farthest + plan.grid.size() {
+            *rate = if way > plan.farthest + plan.grid.size() {
                 T::INFINITY
             } else if caution == Caution::Through {
                 if field.blocked(slice, &center, margin, scratch).is_some() { T::one() } else { T::real(FREE) }
@@ -286,8 +331,12 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         }
         for sensor in field.scenario.sensors {
             let place = field.scenario.sensor_state(sensor, slice.time()).0;
-            let rate = self.landscape.get_mut(plan.grid.cell(&place));
-            if let Some(rate) = rate.filter(|rate| rate.finite() && plan.grid.holds(&place)) {
+            let cell = plan.grid.cell(&place);
+            if !plan.grid.holds(&place) || !needed.holds(&plan.grid.coordinates(cell)) {
+                continue;
+            }
+            let rate = self.landscape.get_mut(cell);
+            if let Some(rate) = rate.filter(|rate| rate.finite()) {
                 *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch));
             }
         }
@@ -340,31 +389,20 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         field: &Field<'_, T, DIM, NODES, AGENTS>,
         plan: &Plan<T, DIM>,
         (number, slice): (usize, &Slice<T, DIM, AGENTS>),
+        blocks: (&Block<DIM>, &Block<DIM>),
         caution: Caution,
     ) {
         let cells = plan.grid.cells();
-        let left = plan.reach * T::from_count(plan.slices - number);
         let Some(parents) = self.parents.get_mut((number - 2) * cells..(number - 1) * cells) else {
             return;
         };
         let Self { landscape, cost, next, moves, .. } = self;
-        let targets = plan.grid.iter().zip(next).zip(parents).enumerate();
-        for (to, (((at, center), best), parent)) in targets {
-            let is_free = landscape.get(to).is_some_and(|&rate| rate < T::INFINITY);
-            if !is_free || norm(&(field.agent.goal - center)) > left {
-                continue;
-            }
-            for (index, from, step) in moves.arriving(&plan.grid, (to, at)) {
-                let before = cost.get(from).copied().unwrap_or(T::INFINITY);
-                if before == T::INFINITY {
-                    continue;
-                }
-                let total = before + step.mean(landscape, from, to) * plan.interval;
-                if total < *best && is_clear(field, slice, (&plan.grid.center_of(from), &center), caution) {
-                    (*best, *parent) = (total, index);
-                }
-            }
-        }
+        let mut sweep = Sweep { landscape, cost, next, parents, interval: plan.interval };
+        let is_open = caution == Caution::Through || field.scenario.regions.is_empty();
+        let clear = (!is_open).then_some(|from: usize, to: usize| {
+            is_clear(field, slice, (&plan.grid.center_of(from), &plan.grid.center_of(to)), caution)
+        });
+        sweep.run(&plan.grid, moves.all(), blocks, clear);
     }
 
     /// The last slice: to the goal itself.
@@ -463,7 +501,7 @@ impl<T: Real, const DIM: usize> Plan<T, DIM> {
         let agent = field.agent;
         let domain = &field.scenario.frame.domain;
         let length = agent.speed_max * variant.duration;
-        let far = length * T::real(INFLATION_MAX).max(variant.inflation);
+        let far = agent.speed_max * variant.span.max(variant.duration) * T::real(INFLATION_MAX).max(variant.inflation);
         let mut cells = cells_max;
         loop {
             let grid = Grid::new(domain, (&agent.start, &agent.goal), far, cells);
@@ -480,6 +518,7 @@ impl<T: Real, const DIM: usize> Plan<T, DIM> {
                     slices,
                     reach: length * variant.inflation / count,
                     interval: variant.duration / count,
+                    farthest: far,
                 };
             }
             cells -= (cells / 16).max(1);

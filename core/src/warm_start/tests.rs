@@ -72,7 +72,7 @@ fn find(
     let mut path = Path::straight(&view, duration).unwrap();
     let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
     let mut scratch = [Sample::default(); 32];
-    let variant = Variant { reach: 4.0, inflation: 1.12, duration };
+    let variant = Variant { reach: 4.0, inflation: 1.12, duration, span: duration };
     let found = search(&view, &mut path, 0, &variant, &mut lattice, &mut scratch);
     (path, found)
 }

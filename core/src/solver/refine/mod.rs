@@ -95,14 +95,18 @@ where
     }
     let plain = View { terms: &integral_terms, ..*scenario };
     frame.collapse(&workspace.best, &mut workspace.iterate);
-    workspace.trial.clone_from(&workspace.best);
-    workspace.by_trajectory.clone_from(&workspace.best);
-    if !draw_inside(scenario, &frame, workspace) {
+    workspace.trial.assign(&workspace.best);
+    workspace.by_trajectory.assign(&workspace.best);
+    let is_inside = ledger.barrier > T::zero()
+        && barrier::log_slacks(&frame, &scenario.frame.domain, &workspace.iterate).finite()
+        && guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) > T::zero();
+    if !is_inside && !draw_inside(scenario, &frame, workspace) {
         return None;
     }
     frame.expand(&workspace.iterate, &mut workspace.trial);
     let extremes = Extremes::new(scenario, &workspace.trial, &mut workspace.scratch)?;
     let scale = ledger.best.abs().max(T::one());
+    let first = T::real(FIRST_BARRIER) * scale;
     let mut path = CentralPath {
         scenario,
         plain: &plain,
@@ -110,12 +114,14 @@ where
         frame: &frame,
         extremes,
         is_guarded: guard::is_needed(scenario),
-        barrier: T::real(FIRST_BARRIER) * scale,
+        barrier: if is_inside { ledger.barrier.min(first) } else { first },
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
         pace_multiplier: T::zero(),
         shift: T::zero(),
     };
-    Some(path.follow(workspace, ledger, deadline))
+    let status = path.follow(workspace, ledger, deadline);
+    ledger.barrier = path.barrier;
+    Some(status)
 }
 
 /// Draws the incumbent, in `workspace.iterate`, inside its bounds; false if that fails.
@@ -512,10 +518,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             self.frame.expand(next, trial);
             let rest = self.rest_of_merit(next, &extremes, trial, scratch);
             ledger.evaluations += 1;
-            let value =
-                if rest.finite() { rest + guard::value(self.plain, trial, &self.merit(), scratch) } else { rest };
+            let own = if rest.finite() { guard::value(self.plain, trial, &self.merit(), scratch) } else { T::zero() };
+            let value = rest + own;
             if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
-                self.keep_if_best(workspace, ledger);
+                self.keep_if_best(own, workspace, ledger);
                 self.frame.expand(&workspace.iterate, &mut workspace.trial);
                 let range = T::real(MULTIPLIER_RANGE);
                 self.visit_multipliers(workspace, Some(&step.unknowns), |old, target| {
@@ -523,7 +529,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                     let moved = old + (target - old) * share.max(T::real(0.1));
                     moved.max(floor).min(old * range)
                 });
-                core::mem::swap(&mut workspace.iterate, &mut workspace.next);
+                workspace.iterate.assign(&workspace.next, self.frame);
                 self.extremes = extremes;
                 self.hold_multipliers(workspace);
                 return Some(share);
@@ -543,17 +549,23 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         self.visit_multipliers(workspace, None, |old, central| old.clamp_to(central / range, central * range));
     }
 
-    /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better.
+    /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better; `own` is the merit of its
+    /// integral terms and guards.
     fn keep_if_best<const NODES: usize, const SENSORS: usize>(
         &self,
+        own: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
     ) {
-        let objective = objective::value(self.scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
-        ledger.evaluations += 1;
+        let objective = if self.is_guarded || !self.extremes.0.is_empty() {
+            ledger.evaluations += 1;
+            objective::value(self.scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch)
+        } else {
+            own
+        };
         if objective < ledger.best {
             ledger.best = objective;
-            core::mem::swap(&mut workspace.best, &mut workspace.trial);
+            workspace.best.assign(&workspace.trial);
         }
     }
 }
