@@ -11,7 +11,7 @@ use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, Variant};
+use crate::warm_start::{self, Prices, Variant};
 
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
@@ -24,6 +24,9 @@ pub(super) const POLISH_ITERATIONS: usize = 12;
 pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 4;
+/// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
+const EQUIPS_MAX: usize = 2;
+const EQUIPS_GAIN: f64 = 1e-6;
 /// Largest distance of two paths that go the same way, over their length.
 const ALIKE: f64 = 0.04;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
@@ -50,8 +53,14 @@ pub(super) fn search<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 where
     T: Real,
 {
-    workspace.base.assign(&workspace.best);
     workspace.lattice.begin();
+    let mut prices = [Prices::default(); AGENTS];
+    if has_equipment(scenario) {
+        workspace.trial.assign(&workspace.best);
+        equip(scenario, workspace, &mut prices);
+        workspace.best.assign(&workspace.trial);
+    }
+    workspace.base.assign(&workspace.best);
     let mut race = Race { scenario, settings, found: Found::nothing(), promise: T::INFINITY, polished: 0 };
     race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
@@ -65,8 +74,16 @@ where
                 break;
             }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
-            let laid = lay(scenario, &variant, order, workspace);
+            let laid = lay(scenario, &variant, (order, &prices), workspace);
             way = way.after(laid, variant.duration);
+            if laid.is_ok() && has_equipment(scenario) {
+                let mut newer = prices;
+                equip(scenario, workspace, &mut newer);
+                if matches!(race.polished, 0) {
+                    // Those of a straight line may be far off. From then on they stay, so that costs are the same.
+                    prices = newer;
+                }
+            }
             if laid.is_ok()
                 && let Some(objective) = project(scenario, settings, workspace, ledger)
                 && race.admits(objective, workspace)
@@ -83,7 +100,60 @@ where
         return (status, closing);
     }
     (ledger.best, ledger.barrier) = (least, barrier);
-    (polish(scenario, settings, workspace, ledger, deadline), None)
+    let mut status = polish(scenario, settings, workspace, ledger, deadline);
+    if has_equipment(scenario) {
+        for _ in 0..EQUIPS_MAX {
+            let Some(again) = equip_anew(scenario, settings, workspace, ledger, deadline) else { break };
+            status = again;
+        }
+    }
+    (status, None)
+}
+
+/// Lays levels and directions of the plan anew, and polishes what comes of it; `None` where that is no better.
+fn equip_anew<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Option<Status>
+where
+    T: Real,
+{
+    if deadline() {
+        return None;
+    }
+    workspace.trial.assign(&workspace.best);
+    equip(scenario, workspace, &mut [Prices::default(); AGENTS]);
+    ledger.evaluations += 1;
+    let objective = objective::value(scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
+    let gain = ledger.best - objective;
+    let slack = guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch);
+    let is_better = gain > T::real(EQUIPS_GAIN) * ledger.best.abs().max(T::one()) && slack > T::zero();
+    if !is_better {
+        return None;
+    }
+    workspace.best.assign(&workspace.trial);
+    (ledger.best, ledger.barrier) = (objective, T::zero());
+    Some(polish(scenario, settings, workspace, ledger, deadline))
+}
+
+/// Whether there is anything to do besides flying.
+fn has_equipment<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
+    scenario.agents.iter().any(|agent| agent.jammer.is_some() || agent.dropout.is_some())
+}
+
+/// Lays levels and directions of all agents along their paths in `workspace.trial`.
+fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    prices: &mut [Prices<T>; AGENTS],
+) {
+    let Workspace { trial, lattice, scratch, .. } = workspace;
+    for (agent, prices) in prices.iter_mut().enumerate().take(scenario.agents.len()) {
+        *prices = warm_start::equip(scenario, trial, agent, lattice, scratch);
+    }
 }
 
 /// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
@@ -253,7 +323,7 @@ fn orders<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> usize {
 fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     variant: &Variant<T>,
-    order: usize,
+    (order, prices): (usize, &[Prices<T>; AGENTS]),
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
 ) -> Result<(), Obstacle<T, DIM>> {
     let Workspace { base, trial, lattice, scratch, .. } = workspace;
@@ -261,7 +331,8 @@ fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
     let agents = scenario.agents.len();
     for place in 0..agents {
         let agent = at_place(order, place, agents);
-        let found = warm_start::search(scenario, trial, agent, variant, lattice, scratch);
+        let prices = prices.get(agent).copied().unwrap_or_default();
+        let found = warm_start::search(scenario, trial, agent, (variant, prices), lattice, scratch);
         found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?;
     }
     keep_right(scenario, trial);

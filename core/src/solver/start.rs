@@ -7,10 +7,11 @@
 
 use crate::constraints;
 use crate::error::{Error, Fault, Item};
-use crate::math::{Point, Real, norm, norm_squared};
+use crate::math::{Real, norm};
 use crate::metrics::Sample;
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
+use crate::warm_start::azimuth_of_nearest;
 
 use super::coordinates::{Frame, Iterate};
 use super::projection::Request;
@@ -178,24 +179,4 @@ fn lay_controls<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usi
             track.dropout.get_mut(1..nodes).unwrap_or_default().fill(level(dropout.budget));
         }
     }
-}
-
-/// Direction from a position to the nearest ranging sensor, rad; 0 where there is none.
-fn azimuth_of_nearest<T: Real, const DIM: usize>(
-    scenario: &View<'_, T, DIM>,
-    position: &Point<T, DIM>,
-    time: T,
-) -> T {
-    let mut nearest = (T::INFINITY, T::zero());
-    for sensor in scenario.sensors.iter().filter(|sensor| sensor.ranging.is_some()) {
-        let offset = scenario.sensor_state(sensor, time).0 - position;
-        let square = norm_squared(&offset);
-        if square < nearest.0 {
-            let mut components = offset.iter().copied();
-            let east = components.next().unwrap_or_default();
-            let north = components.next().unwrap_or_default();
-            nearest = (square, north.atan2(east));
-        }
-    }
-    nearest.1
 }

@@ -2,8 +2,7 @@
 //!
 //! The cost is the scenario's own: every term that is active in the slice, by the part of the slice that lies in its
 //! window, with sign and weights. The other agents stay on their tracks; where the agent jams, their terms count too.
-//! Levels of jamming and dropout are what the budgets allow evenly; where the agent's own jamming betrays it, it
-//! jams where that pays.
+//! The agent jams, and is silent, where that pays at the prices that its budgets have ([`super::equipment`]).
 //!
 //! A worst-case term is its log-sum-exp along the path, majorised by its tangent at an earlier path: that is a sum
 //! along the path again, and minimising it never makes the smoothed worst value worse.
@@ -11,7 +10,7 @@
 use heapless::Vec;
 
 use crate::constraints::region::horizontal;
-use crate::math::{Point, Real, norm};
+use crate::math::{Point, Real};
 use crate::metrics::{Needs, Sample, Situation, Values, forward};
 use crate::model::jamming::Emitter;
 use crate::scenario::{
@@ -19,6 +18,7 @@ use crate::scenario::{
 };
 use crate::trajectory::Trajectory;
 
+use super::equipment::{Doing, Prices, azimuth_of_nearest, levels};
 use super::{Blocked, Caution};
 
 /// exp of more than this is held, for the sake of single precision.
@@ -42,9 +42,10 @@ pub(super) struct Field<'a, T, const DIM: usize, const NODES: usize, const AGENT
     pub(super) index: usize,
     pub(super) agent: &'a Agent<T, DIM>,
     tangents: [Tangent<T>; TERMS_MAX],
-    /// Jamming level and dropout that last the whole flight.
-    level: T,
-    dropout: T,
+    prices: Prices<T>,
+    /// Levels of jamming and of dropout to choose from, where there is such equipment.
+    jam: Option<[T; 2]>,
+    dropout: Option<[T; 2]>,
 }
 
 /// A slice of time.
@@ -71,12 +72,12 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         scenario: &'a View<'a, T, DIM>,
         trajectory: &'a Trajectory<T, DIM, NODES, AGENTS>,
         index: usize,
+        prices: Prices<T>,
         pass: usize,
         scratch: &mut [Sample<T, DIM>],
     ) -> Option<Self> {
         let agent = scenario.agents.get(index)?;
-        let duration = trajectory.duration().max(T::MIN_POSITIVE);
-        let even = |budget: T| (budget / duration).clamp_to(T::zero(), T::one());
+        let duration = trajectory.duration();
         let none = Tangent { sharpness: T::zero(), level: T::zero(), scale: T::zero() };
         let mut field = Self {
             scenario,
@@ -84,8 +85,9 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             index,
             agent,
             tangents: [none; TERMS_MAX],
-            level: agent.jammer.map_or(T::zero(), |jammer| even(jammer.budget)),
-            dropout: agent.dropout.map_or(T::zero(), |dropout| even(dropout.budget)),
+            prices,
+            jam: agent.jammer.map(|jammer| levels(jammer.budget, duration)),
+            dropout: agent.dropout.map(|dropout| levels(dropout.budget, duration)),
         };
         for (number, term) in scenario.terms.iter().enumerate() {
             if term.reduce == Reduce::Extreme {
@@ -112,9 +114,19 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         self.scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme)
     }
 
-    /// Levels of jamming and dropout that last the whole flight.
-    pub(super) fn levels(&self) -> [T; 2] {
-        [self.level, self.dropout]
+    /// What costs depend on besides time and place: even levels, and prices.
+    pub(super) fn equipment(&self) -> [T; 4] {
+        let even = |levels: Option<[T; 2]>| levels.map_or(T::zero(), |levels| levels[0]);
+        [even(self.jam), even(self.dropout), self.prices.jam, self.prices.dropout]
+    }
+
+    /// A node of the agent's track: the slice that ends there, where it is and what it does.
+    pub(super) fn node(&self, node: usize) -> Option<(Slice<T, DIM, AGENTS>, Point<T, DIM>, Doing<T>)> {
+        let track = self.trajectory.tracks.get(self.index)?;
+        let share = |node: usize| T::from_count(node) / T::from_count(self.trajectory.intervals().max(1));
+        let (&level, &azimuth, &dropout) = (track.jam.get(node)?, track.azimuth.get(node)?, track.dropout.get(node)?);
+        let slice = self.slice(share(node.saturating_sub(1)), share(node));
+        Some((slice, *track.path.get(node)?, Doing { level, azimuth, dropout }))
     }
 
     /// The tangent at the path as it is.
@@ -204,19 +216,31 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         weights
     }
 
-    /// Cost a second of being at `position`.
+    /// Cost a second of being at `position`, what is used of budgets at its price.
     pub(super) fn rate(
         &self,
         slice: &Slice<T, DIM, AGENTS>,
         position: &Point<T, DIM>,
         scratch: &mut [Sample<T, DIM>],
     ) -> T {
-        let betrayal = self.agent.jammer.map_or(Betrayal::None, |jammer| jammer.betrayal);
-        let rate = self.rate_at(slice, position, self.level, scratch);
-        if self.level == T::zero() || betrayal == Betrayal::None {
-            return rate;
+        let mut doing = Doing { level: T::zero(), azimuth: T::zero(), dropout: T::zero() };
+        let mut best = self.rate_at(slice, position, &doing, scratch);
+        if let Some(levels) = self.jam {
+            doing.azimuth = self.azimuth(slice.time, position);
+            for level in levels {
+                let paid = self.prices.jam * level;
+                let rate = self.rate_at(slice, position, &Doing { level, ..doing }, scratch) + paid;
+                if rate < best {
+                    (best, doing.level) = (rate, level);
+                }
+            }
         }
-        rate.min(self.rate_at(slice, position, T::zero(), scratch))
+        let jammed = self.prices.jam * doing.level;
+        for dropout in self.dropout.into_iter().flatten() {
+            let paid = self.prices.dropout * dropout + jammed;
+            best = best.min(self.rate_at(slice, position, &Doing { dropout, ..doing }, scratch) + paid);
+        }
+        best
     }
 
     /// Mean cost a second of flying across a cell over `place`, along its axes.
@@ -243,37 +267,16 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         sum / T::from_count(count.max(1))
     }
 
-    /// The jamming level that pays at `position`, and its azimuth.
-    pub(super) fn control(
+    /// Cost a second of being at `position` and doing that.
+    pub(super) fn rate_at(
         &self,
         slice: &Slice<T, DIM, AGENTS>,
         position: &Point<T, DIM>,
-        scratch: &mut [Sample<T, DIM>],
-    ) -> (T, T) {
-        let azimuth = self.azimuth(slice.time, position);
-        if self.level == T::zero() {
-            return (T::zero(), azimuth);
-        }
-        let silent = self.rate_at(slice, position, T::zero(), scratch);
-        let loud = self.rate_at(slice, position, self.level, scratch);
-        (if loud < silent { self.level } else { T::zero() }, azimuth)
-    }
-
-    /// Dropout that lasts the whole flight.
-    pub(super) fn dropout(&self) -> T {
-        self.dropout
-    }
-
-    fn rate_at(
-        &self,
-        slice: &Slice<T, DIM, AGENTS>,
-        position: &Point<T, DIM>,
-        level: T,
+        &Doing { level, azimuth, dropout }: &Doing<T>,
         scratch: &mut [Sample<T, DIM>],
     ) -> T {
         let mut emitters = slice.emitters.clone();
         if let (Some(jammer), true) = (&self.agent.jammer, level > T::zero()) {
-            let azimuth = self.azimuth(slice.time, position);
             // One an agent at most, so there is room.
             let _ = emitters.push(Emitter::new(self.index, jammer, *position, level, azimuth));
         }
@@ -282,7 +285,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             time: slice.time,
             position: *position,
             reference: None,
-            dropout: self.dropout,
+            dropout,
             level,
             betrayal,
         };
@@ -323,15 +326,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         if self.agent.jammer.is_none_or(|jammer| jammer.pattern == BeamPattern::Isotropic) {
             return T::zero();
         }
-        let mut nearest = (T::INFINITY, T::zero());
-        for sensor in self.scenario.sensors.iter().filter(|sensor| sensor.ranging.is_some()) {
-            let offset = self.scenario.sensor_state(sensor, time).0 - position;
-            let flat = horizontal(&offset);
-            if norm(&offset) < nearest.0 {
-                nearest = (norm(&offset), flat[1].atan2(flat[0]));
-            }
-        }
-        nearest.1
+        azimuth_of_nearest(self.scenario, position, time)
     }
 
     /// What forbids being at `position`, or within the margin of it.
@@ -352,7 +347,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             return None;
         }
         let betrayal = Betrayal::None;
-        let (dropout, level) = (self.dropout, T::zero());
+        let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
         let values = forward(self.scenario, &here, &slice.emitters, Needs::ALL, scratch).values;
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));

@@ -22,9 +22,10 @@
 //! Costs have peaks at sensors that are narrower than a cell, and location errors are largest there: a cell that holds
 //! a sensor costs what flying over the sensor does, where that is less than its centre, and the path goes there.
 //!
-//! Limits: 255 moves from a cell; a lagged reference point is taken as the present position; jamming and dropout
-//! last the whole flight at the level that their budgets allow.
+//! Limits: 255 moves from a cell; a lagged reference point is taken as the present position; what budgets are worth is
+//! told by [`Prices`], of an earlier path.
 
+mod equipment;
 mod field;
 mod grid;
 mod obstruction;
@@ -42,6 +43,7 @@ use grid::{Grid, Moves};
 use obstruction::{first_blocked, first_crossed};
 use sweep::{Block, Sweep};
 
+pub(crate) use equipment::{Prices, azimuth_of_nearest, equip};
 pub use obstruction::{Blocked, Obstruction};
 
 /// Variants that [`variants`] lists at most.
@@ -96,7 +98,7 @@ struct Survey<T> {
     caution: Caution,
     /// Lowest corner, then sides of a cell.
     grid: [[T; 3]; 2],
-    equipment: [T; 2],
+    equipment: [T; 4],
     weights: Weights<T>,
 }
 
@@ -163,11 +165,11 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
 /// variant's flight time; returns its estimated cost, the penalty on late arrival included.
 ///
 /// `trajectory` must be of the scenario's size, with some path in every track: the other agents keep theirs, and that
-/// of `agent` is where worst-case terms start from. Levels of jamming and dropout are written too, as estimated.
+/// of `agent` is where worst-case terms start from. Levels of jamming and dropout stay what they are: see [`equip`].
 ///
 /// # Errors
 /// Where there is no path, what closes the way. The path of `agent` is then not to be used.
-pub fn search<
+pub(crate) fn search<
     T,
     const DIM: usize,
     const NODES: usize,
@@ -178,7 +180,7 @@ pub fn search<
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     agent: usize,
-    variant: &Variant<T>,
+    (variant, prices): (&Variant<T>, Prices<T>),
     lattice: &mut Lattice<T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> Result<T, Obstruction<T, DIM>>
@@ -194,7 +196,7 @@ where
     for caution in [Caution::Careful, Caution::Bold] {
         let mut found = None;
         for pass in 0..passes {
-            found = lattice.pass(scenario, trajectory, agent, (variant, caution, pass), scratch).ok();
+            found = lattice.pass(scenario, trajectory, (agent, prices), (variant, caution, pass), scratch).ok();
             if found.is_none() {
                 break;
             }
@@ -208,7 +210,7 @@ where
     }
     let position = scenario.agents.get(agent).map_or(Point::zeros(), |agent| agent.goal);
     let out_of_time = Obstruction { by: Blocked::Time, position, time: frame.start_time + variant.duration };
-    match lattice.pass(scenario, trajectory, agent, (variant, Caution::Through, 0), scratch) {
+    match lattice.pass(scenario, trajectory, (agent, prices), (variant, Caution::Through, 0), scratch) {
         Ok(_) => Err(first_blocked(scenario, trajectory, agent, scratch).unwrap_or(out_of_time)),
         Err(()) => Err(out_of_time),
     }
@@ -233,11 +235,11 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         &mut self,
         scenario: &View<'_, T, DIM>,
         trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
-        agent: usize,
+        (agent, prices): (usize, Prices<T>),
         (variant, caution, pass): (&Variant<T>, Caution, usize),
         scratch: &mut [Sample<T, DIM>],
     ) -> Result<T, ()> {
-        let field = Field::new(scenario, trajectory, agent, pass, scratch).ok_or(())?;
+        let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?;
         let plan = Plan::new(&field, variant, CELLS, PARENTS);
         self.moves.collect(&plan.grid, plan.reach);
         let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
@@ -302,7 +304,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
             agent: field.index,
             caution,
             grid: plan.grid.described(),
-            equipment: field.levels(),
+            equipment: field.equipment(),
             weights: slice.weights(),
         };
         if self.surveyed == Some(key) {
@@ -473,9 +475,6 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
                 let share = (T::from_count(node) / intervals - first) * slices;
                 let position = from + (end - from) * share.min(T::one());
                 *track.path.get_mut(node)? = position;
-                (*track.jam.get_mut(node)?, *track.azimuth.get_mut(node)?) =
-                    field.control(&slice, &position, scratch);
-                *track.dropout.get_mut(node)? = field.dropout();
                 node -= 1;
             }
             end = from;

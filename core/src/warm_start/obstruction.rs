@@ -11,6 +11,7 @@ use crate::metrics::Sample;
 use crate::scenario::{Region, View};
 use crate::trajectory::Trajectory;
 
+use super::equipment::Prices;
 use super::field::{Field, Slice};
 
 /// What keeps a path from the goal.
@@ -43,7 +44,7 @@ pub(super) fn first_blocked<T: Real, const DIM: usize, const NODES: usize, const
     agent: usize,
     scratch: &mut [Sample<T, DIM>],
 ) -> Option<Obstruction<T, DIM>> {
-    let field = Field::new(scenario, trajectory, agent, 0, scratch)?;
+    let field = Field::new(scenario, trajectory, agent, Prices::default(), 0, scratch)?;
     let count = T::from_count(trajectory.intervals().max(1));
     let path = &trajectory.tracks.get(agent)?.path;
     for node in 1..trajectory.nodes() {
