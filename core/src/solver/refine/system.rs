@@ -99,17 +99,25 @@ impl<T: Real, const DIM: usize> Local<T, DIM> {
         Self { matrix: none, factor: none, here: [origin(); KINDS], before: [origin(); KINDS] }
     }
 
-    /// Factors the matrix with `shift` on the diagonal; false if it is not positive definite. Kinds that do not
-    /// exist have a zero diagonal and stay out.
+    /// Factors the matrix with `shift` on the diagonal; false if it holds what is not a number. Kinds that do not exist
+    /// have a zero diagonal and stay out.
+    ///
+    /// Where a control bends downwards, as silence does that is all but complete, its curvature is taken positive and its
+    /// coupling to the path is left out: else the shift that would make it definite would hold the whole path.
     fn factor(&mut self, shift: T) -> bool {
         let mut lower = [[T::zero(); KINDS]; KINDS];
         for column in 0..KINDS {
             let exists = self.matrix[column][column] != T::zero();
-            let mut pivot = if exists { self.matrix[column][column] + shift } else { T::one() };
+            let mut pivot = if exists { self.matrix[column][column] } else { T::one() };
             for k in 0..column {
                 pivot -= lower[column][k] * lower[column][k];
             }
-            if pivot.is_not_a_number() || pivot <= T::zero() {
+            if pivot <= T::zero() {
+                pivot = (-pivot).max(T::MIN_POSITIVE);
+                (self.here[column], self.before[column]) = (Point::zeros(), Point::zeros());
+            }
+            pivot += if exists { shift } else { T::zero() };
+            if pivot.is_not_a_number() {
                 return false;
             }
             let inverse = T::one() / pivot.sqrt();
