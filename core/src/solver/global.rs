@@ -32,6 +32,8 @@ const ALIKE: f64 = 0.04;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
 pub(super) const PROJECTION_STEPS: usize = 300;
 const PROJECTION_TOLERANCE: f64 = 1e-3;
+/// How much more a change of the flight time weighs there.
+const PUNCTUAL: f64 = 100.0;
 /// Part of the least distance that agents who meet head-on miss.
 const HEAD_ON: f64 = 0.8;
 /// Part of the flight in which agents come to keep right, and cease to.
@@ -408,7 +410,9 @@ fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, 
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ledger: &mut Ledger<T>,
 ) -> Option<T> {
-    let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.trial.duration());
+    let mut frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.trial.duration());
+    // A lattice path is longer than need be: it is to become shorter, not later.
+    frame.inertia *= T::real(PUNCTUAL);
     let domain = &scenario.frame.domain;
     frame.collapse(&workspace.base, &mut workspace.anchor);
     frame.collapse(&workspace.trial, &mut workspace.iterate);
