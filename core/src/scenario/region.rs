@@ -108,6 +108,13 @@ fn turn<T: Real>(a: &Point<T, 2>, b: &Point<T, 2>, c: &Point<T, 2>) -> T {
 }
 
 impl<T: Real> Polygon<T> {
+    /// The circle around the mean of its vertices that holds it: centre and radius, length units.
+    pub(crate) fn circle(&self) -> (Point<T, 2>, T) {
+        let vertices = || self.vertices.iter().take(self.count);
+        let center = vertices().fold(Point::zeros(), |sum, vertex| sum + vertex) / T::from_count(self.count.max(1));
+        (center, vertices().map(|vertex| norm(&(vertex - center))).fold(T::zero(), T::max))
+    }
+
     /// The polygon with these vertices (length units), in order along its boundary, in either direction.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ use crate::warm_start::{self, Prices, Variant};
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
 use super::projection::Request;
-use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, projected_gradient, refine};
+use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, neighbours, projected_gradient, refine};
 
 /// Projected-gradient iterations of one candidate.
 pub(super) const POLISH_ITERATIONS: usize = 12;
@@ -27,6 +27,8 @@ pub(super) const CANDIDATES_MAX: usize = 4;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
 const EQUIPS_MAX: usize = 2;
 const EQUIPS_GAIN: f64 = 1e-6;
+/// Times that the plan moves on to another flight time at which other nodes are before an instant.
+const TIMES_MAX: usize = 4;
 /// Largest distance of two paths that go the same way, over their length.
 const ALIKE: f64 = 0.04;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
@@ -95,14 +97,18 @@ where
             }
         }
     }
-    workspace.best.assign(&workspace.champion);
-    let Found { status, least, barrier, .. } = race.found;
-    if status == Status::Infeasible {
+    if race.found.status == Status::Infeasible {
+        workspace.best.assign(&workspace.champion);
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
-        return (status, closing);
+        return (Status::Infeasible, closing);
     }
-    (ledger.best, ledger.barrier) = (least, barrier);
-    let mut status = polish(scenario, settings, workspace, ledger, deadline);
+    if settings.candidates > 1 {
+        race.change_sides(workspace, ledger, deadline);
+    }
+    let mut status = race.finish(workspace, ledger, deadline);
+    if settings.candidates > 1 {
+        status = race.change_times(workspace, ledger, deadline).unwrap_or(status);
+    }
     if has_equipment(scenario) {
         for _ in 0..EQUIPS_MAX {
             let Some(again) = equip_anew(scenario, settings, workspace, ledger, deadline) else { break };
@@ -287,6 +293,76 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
                 workspace.champion.assign(&workspace.best);
             }
         }
+    }
+}
+
+impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
+    /// Lets the champion pass what it passes on the other side.
+    fn change_sides<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        for passed in neighbours::passed(self.scenario, &workspace.champion) {
+            if deadline() {
+                return;
+            }
+            workspace.trial.assign(&workspace.champion);
+            let is_changed = neighbours::change_side(self.scenario, &mut workspace.trial, &passed);
+            if is_changed && project(self.scenario, self.settings, workspace, ledger).is_some() {
+                workspace.best.assign(&workspace.trial);
+                self.run(workspace, ledger, deadline);
+            }
+        }
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`.
+    fn finish<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        workspace.best.assign(&workspace.champion);
+        (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
+        polish(self.scenario, self.settings, workspace, ledger, deadline)
+    }
+
+    /// Flies the plan a little slower or faster, so that other nodes are before the instants at which terms change; the
+    /// status of the last that was better.
+    fn change_times<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Option<Status> {
+        let mut status = None;
+        let allowed = self.scenario.frame.time.max - self.scenario.frame.start_time;
+        for _ in 0..TIMES_MAX {
+            workspace.champion.assign(&workspace.best);
+            (self.found.least, self.found.barrier) = (ledger.best, ledger.barrier);
+            let known = self.found.least;
+            for duration in neighbours::other_times(self.scenario, workspace.champion.duration()) {
+                if deadline() || duration > allowed {
+                    continue;
+                }
+                workspace.trial.assign(&workspace.champion);
+                workspace.trial.set_duration(self.scenario.frame.start_time, duration);
+                if project(self.scenario, self.settings, workspace, ledger).is_some() {
+                    workspace.best.assign(&workspace.trial);
+                    self.run(workspace, ledger, deadline);
+                }
+            }
+            let is_better = self.found.least < known - known.abs().max(T::one()) * T::real(EQUIPS_GAIN);
+            if !is_better {
+                workspace.best.assign(&workspace.champion);
+                (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
+                break;
+            }
+            status = Some(self.finish(workspace, ledger, deadline));
+        }
+        status
     }
 }
 

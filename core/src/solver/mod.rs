@@ -23,6 +23,7 @@
 //! - `refine`: a primal-dual interior point method with banded systems, from where the gradient leaves off.
 //! - `obstacle`: what stands in the way where no feasible plan is found.
 //! - `bounds`: the most that a plan takes, from the settings alone.
+//! - `neighbours`: challengers of a good path, one decision changed.
 //! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
 //!
 //! Limits: one basin from [`Start::Straight`] or [`Start::Given`]; the best of a few from [`Start::Global`].
@@ -34,6 +35,7 @@ mod coordinates;
 mod feasible;
 mod global;
 mod guard;
+mod neighbours;
 mod obstacle;
 mod projected_gradient;
 mod projection;
