@@ -187,6 +187,8 @@ pub(super) struct Frame<T, const DIM: usize, const AGENTS: usize> {
     pub(super) start_time: T,
     /// Smallest pace: the whole of the time there is.
     pub(super) pace_min: T,
+    /// Largest pace, where the flight is held to the times between which no node crosses an instant at which terms change.
+    pub(super) pace_max: Option<T>,
     /// Weight m of the squared pace in the metric.
     pub(super) inertia: T,
     agent: [AgentFrame<T, DIM>; AGENTS],
@@ -230,6 +232,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
             interval,
             start_time: scenario.frame.start_time,
             pace_min: duration / allowed,
+            pace_max: None,
             inertia: T::zero(),
             agent,
         };
@@ -240,6 +243,18 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
             frame.agent().map(|a| norm_squared(&a.reach) / count).fold(T::zero(), |sum, part| sum + part);
         frame.inertia = stretch + count * T::from_count(agents.max(1));
         frame
+    }
+
+    /// Holds the flight time between the shortest and the longest given.
+    pub(super) fn hold(&mut self, [shortest, longest]: [Option<T>; 2]) {
+        let whole = self.duration(T::one());
+        self.pace_min = longest.map_or(self.pace_min, |longest| self.pace_min.max(whole / longest));
+        self.pace_max = shortest.map(|shortest| whole / shortest);
+    }
+
+    /// Room to the smallest pace, and to the largest where there is one.
+    pub(super) fn pace_slacks(&self, pace: T) -> [Option<T>; 2] {
+        [Some(pace - self.pace_min), self.pace_max.map(|most| most - pace)]
     }
 
     /// Frames of the agents there are.

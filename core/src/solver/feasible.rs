@@ -50,7 +50,8 @@ pub(super) fn largest_share<T: Real, const DIM: usize, const NODES: usize, const
     to: &Iterate<T, DIM, NODES, AGENTS>,
     center: T,
 ) -> T {
-    let mut share = box_share(from.pace, to.pace, (frame.pace_min, frame.pace_min), (T::MAX, T::MAX));
+    let most = frame.pace_max.unwrap_or(T::MAX);
+    let mut share = box_share(from.pace, to.pace, (frame.pace_min, frame.pace_min), (most, most));
     let agents = from.interior(frame).zip(to.interior(frame)).zip(frame.agent());
     for ((a, b), agent) in agents {
         share = share.min(agent_share(frame, domain, agent, (a, from.pace), (b, to.pace), center));

@@ -16,7 +16,7 @@ use crate::warm_start::{self, Prices, Variant};
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
 use super::projection::Request;
-use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, improve, neighbours, projected_gradient, refine};
+use super::{Ledger, Obstacle, Settings, Status, Times, Workspace, guard, improve, neighbours, projected_gradient, refine};
 
 /// Projected-gradient iterations of one candidate.
 pub(super) const POLISH_ITERATIONS: usize = 12;
@@ -326,6 +326,7 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
     ) -> Status {
         workspace.best.assign(&workspace.champion);
         (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
+        ledger.times = Times::Held;
         polish(self.scenario, self.settings, workspace, ledger, deadline)
     }
 

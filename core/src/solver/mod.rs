@@ -158,6 +158,7 @@ where
         evaluations: 1,
         projection_steps: 0,
         barrier: T::zero(),
+        times: Times::Free,
         keeps: Keeps::Better,
     };
     let (status, closing) = if !first.finite() {
@@ -214,7 +215,17 @@ struct Ledger<T> {
     projection_steps: usize,
     /// Barrier parameter that the last refinement ended with, where the incumbent is the plan it ended with; 0 otherwise.
     barrier: T,
+    times: Times,
     keeps: Keeps,
+}
+
+/// Which flight times a refinement may take.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Times {
+    /// Any.
+    Free,
+    /// Those at which no node crosses an instant at which terms change: between them the objective does not jump.
+    Held,
 }
 
 /// What makes a trial the incumbent.

@@ -182,6 +182,17 @@ pub(super) fn other_times<T: Real, const DIM: usize>(
     times
 }
 
+/// The shortest and the longest flight time around `duration` at which no node crosses an instant at which terms change, s;
+/// `None` where there is no such instant on that side.
+pub(super) fn piece<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T) -> [Option<T>; 2] {
+    let others = other_times(scenario, duration);
+    let shortest = others.iter().copied().filter(|time| *time < duration).reduce(T::max);
+    let longest = others.iter().copied().filter(|time| *time > duration).reduce(T::min);
+    // What is known is on the other side of the instants.
+    let (above, below) = (T::real(1.0 + 2.0 * PAST), T::real(1.0 - 2.0 * PAST));
+    [shortest.map(|time| time * above), longest.map(|time| time * below)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -119,7 +119,7 @@ pub(super) fn log_slacks<T: Real, const DIM: usize, const NODES: usize, const AG
     iterate: &Iterate<T, DIM, NODES, AGENTS>,
 ) -> T {
     let mut logs = LogSum::new();
-    logs.add(iterate.pace - frame.pace_min);
+    frame.pace_slacks(iterate.pace).into_iter().flatten().for_each(|slack| logs.add(slack));
     for (offsets, agent) in iterate.interior(frame).zip(frame.agent()) {
         for_each_ball(frame, agent, offsets, iterate.pace, |_, ball| logs.add(ball.slack()));
         for_each_wall(frame, domain, agent, (offsets, iterate.pace), |wall| logs.add(wall.slack));

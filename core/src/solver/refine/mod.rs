@@ -31,7 +31,7 @@ use crate::scenario::{Reduce, TERMS_MAX, Term, View};
 use super::controls::{Bound, Kind};
 use super::coordinates::{Frame, Iterate};
 use super::feasible::largest_share;
-use super::{Ledger, Settings, Status, Workspace, guard};
+use super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours};
 use assemble::Source;
 use barrier::Multipliers;
 use extremes::Extremes;
@@ -88,7 +88,10 @@ pub(super) fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 where
     T: Real,
 {
-    let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
+    let mut frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
+    if ledger.times == Times::Held {
+        frame.hold(neighbours::piece(scenario, workspace.best.duration()));
+    }
     let mut integral_terms = Vec::<Term<T>, TERMS_MAX>::new();
     for term in scenario.terms.iter().filter(|term| term.reduce == Reduce::Integral) {
         let _ = integral_terms.push(*term);
@@ -116,7 +119,7 @@ where
         is_guarded: guard::is_needed(scenario),
         barrier: if is_inside { ledger.barrier.min(first) } else { first },
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
-        pace_multiplier: T::zero(),
+        pace_multipliers: [T::zero(); 2],
         shift: T::zero(),
     };
     let status = path.follow(workspace, ledger, deadline);
@@ -139,7 +142,7 @@ where
     for _ in 0..4 {
         let Workspace { iterate, candidate, trial, scratch, .. } = workspace;
         // The same path, flown a little slower.
-        let slower = candidate.pace * (T::one() - inside);
+        let slower = candidate.pace.min(frame.pace_max.unwrap_or(T::MAX)) * (T::one() - inside);
         let pace = slower.max(frame.pace_min + (candidate.pace - frame.pace_min) * T::real(0.5));
         let share = pace / candidate.pace;
         iterate.pace = pace;
@@ -191,7 +194,8 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     is_guarded: bool,
     barrier: T,
     barrier_last: T,
-    pace_multiplier: T,
+    /// Of the smallest and of the largest pace.
+    pace_multipliers: [T; 2],
     shift: T,
 }
 
@@ -283,7 +287,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
         let keep = |_: T, central: T| central;
-        self.pace_multiplier = self.barrier / (workspace.iterate.pace - self.frame.pace_min);
+        let slacks = self.frame.pace_slacks(workspace.iterate.pace);
+        self.pace_multipliers = slacks.map(|slack| slack.map_or(T::zero(), |slack| self.barrier / slack));
         self.frame.expand(&workspace.iterate, &mut workspace.trial);
         self.visit_multipliers(workspace, None, keep);
     }
@@ -349,8 +354,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 });
             }
         }
-        let pace_slack = iterate.pace - frame.pace_min;
-        self.pace_multiplier = update(self.pace_multiplier, target(pace_slack, self.pace_multiplier, pace_step));
+        let slacks = frame.pace_slacks(iterate.pace).into_iter().zip([pace_step, -pace_step]);
+        for (multiplier, (slack, change)) in self.pace_multipliers.iter_mut().zip(slacks) {
+            *multiplier = slack.map_or(T::zero(), |slack| update(*multiplier, target(slack, *multiplier, change)));
+        }
     }
 
     /// Solves the Newton system; the iterate plus the step is left in `workspace.candidate`.
@@ -427,17 +434,22 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) -> (T, T) {
         let pace = workspace.iterate.pace;
-        let slack = pace - self.frame.pace_min;
         let timing = &self.scenario.frame.time;
         let duration = self.frame.duration(pace);
         let late = (self.frame.start_time + duration - timing.target).max(T::zero());
         let by_pace = -duration / pace;
         let two = T::real(2.0);
-        let mut weight = self.pace_multiplier / slack;
+        let (mut weight, mut push) = (T::zero(), T::zero());
+        let sides = self.frame.pace_slacks(pace).into_iter().zip(self.pace_multipliers).zip([T::one(), -T::one()]);
+        for ((slack, multiplier), side) in sides {
+            let Some(slack) = slack else { continue };
+            weight += multiplier / slack;
+            push += side * self.barrier / slack;
+        }
         if late > T::zero() {
             weight += two * timing.penalty * (by_pace * by_pace - late * two * by_pace / pace);
         }
-        (weight, self.barrier / slack - workspace.gradient.pace)
+        (weight, push - workspace.gradient.pace)
     }
 
     fn solve<const NODES: usize, const SENSORS: usize>(
