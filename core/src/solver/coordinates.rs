@@ -118,6 +118,15 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Iterate
         sum
     }
 
+    /// Makes the used part zero.
+    pub(super) fn clear(&mut self, frame: &Frame<T, DIM, AGENTS>) {
+        self.interior_mut(frame).for_each(|offsets| offsets.fill(Point::zeros()));
+        for (slot, _) in frame.equipment() {
+            self.levels_mut(slot, frame.intervals).fill(T::zero());
+        }
+        self.pace = T::zero();
+    }
+
     /// Copies the used part.
     pub(super) fn assign(&mut self, from: &Self, frame: &Frame<T, DIM, AGENTS>) {
         for (mine, theirs) in self.interior_mut(frame).zip(from.interior(frame)) {

@@ -13,7 +13,7 @@ use crate::scenario::View;
 use crate::trajectory::Trajectory;
 use crate::warm_start::{self, Prices, Variant};
 
-use super::coordinates::{Frame, Iterate};
+use super::coordinates::Frame;
 use super::feasible::largest_share;
 use super::projection::Request;
 use super::{Ledger, Obstacle, Settings, Status, Times, Workspace, guard, improve, neighbours, projected_gradient, refine};
@@ -24,6 +24,8 @@ pub(super) const POLISH_ITERATIONS: usize = 12;
 pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 4;
+/// Lattice paths in a row that bring nothing, after which there are no more.
+const IDLE_MAX: usize = 3;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
 const EQUIPS_MAX: usize = 2;
 const EQUIPS_GAIN: f64 = 1e-6;
@@ -65,16 +67,18 @@ where
         workspace.best.assign(&workspace.trial);
     }
     workspace.base.assign(&workspace.best);
-    let mut race = Race { scenario, settings, found: Found::nothing(), promise: T::INFINITY, polished: 0 };
+    let mut race = Race { scenario, settings, found: Found::nothing(), promise: T::INFINITY, polished: 0, idle: 0 };
     race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
     hurried.truncate(settings.variants.max(1));
     for order in 0..orders(scenario) {
+        race.idle = 0;
         for (number, variant) in
             hurried.iter().copied().chain(unhurried(scenario).take(settings.variants)).enumerate()
         {
-            if deadline() || number >= hurried.len() && matches!(way, Way::Open) {
+            let is_settled = number > 0 && race.idle >= IDLE_MAX;
+            if deadline() || is_settled || number >= hurried.len() && matches!(way, Way::Open) {
                 break;
             }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
@@ -88,6 +92,7 @@ where
                     prices = newer;
                 }
             }
+            race.idle += 1;
             if laid.is_ok()
                 && let Some(objective) = project(scenario, settings, workspace, ledger)
                 && race.admits(objective, workspace)
@@ -248,6 +253,8 @@ struct Race<'a, T, const DIM: usize> {
     promise: T,
     /// Lattice paths polished.
     polished: usize,
+    /// Lattice paths in a row that brought nothing.
+    idle: usize,
 }
 
 impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
@@ -286,6 +293,7 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         if status != Status::Infeasible && (ledger.best < found.least || found.least == T::INFINITY) {
             *found = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
             workspace.champion.assign(&workspace.best);
+            self.idle = 0;
         } else if found.status == Status::Infeasible {
             let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
             if slack > found.slack {
@@ -494,8 +502,7 @@ fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, 
     frame.collapse(&workspace.base, &mut workspace.anchor);
     frame.collapse(&workspace.trial, &mut workspace.iterate);
     projected_gradient::lay_anchor(scenario, &frame, &mut workspace.anchor);
-    let mut none = Iterate::zeros();
-    none.pace = T::zero();
+    workspace.gradient.clear(&frame);
     workspace.projection.prepare(&frame);
     let request = Request {
         frame: &frame,
@@ -505,8 +512,8 @@ fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, 
         tolerance: T::real(PROJECTION_TOLERANCE),
         steps_max: PROJECTION_STEPS,
     };
-    let Workspace { iterate, candidate, next, anchor, projection, .. } = workspace;
-    ledger.projection_steps += projection.project(&request, iterate, &none, candidate);
+    let Workspace { iterate, candidate, next, anchor, gradient, projection, .. } = workspace;
+    ledger.projection_steps += projection.project(&request, iterate, gradient, candidate);
     projected_gradient::clamp_to_domain(&frame, domain, candidate);
     let share = largest_share(&frame, domain, anchor, candidate, anchor.pace);
     next.between(anchor, candidate, share, &frame);

@@ -13,7 +13,7 @@ use crate::scenario::View;
 use crate::trajectory::Trajectory;
 use crate::warm_start::azimuth_of_nearest;
 
-use super::coordinates::{Frame, Iterate};
+use super::coordinates::Frame;
 use super::projection::Request;
 use super::{Settings, Workspace};
 
@@ -141,8 +141,7 @@ where
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, duration);
     workspace.trial.set_duration(scenario.frame.start_time, duration);
     frame.collapse(&workspace.trial, &mut workspace.iterate);
-    let mut none = Iterate::zeros();
-    none.pace = T::zero();
+    workspace.gradient.clear(&frame);
     workspace.projection.prepare(&frame);
     let request = Request {
         frame: &frame,
@@ -152,7 +151,7 @@ where
         tolerance: settings.margin * T::real(10.0),
         steps_max: settings.projection_steps * 10,
     };
-    workspace.projection.project(&request, &workspace.iterate, &none, &mut workspace.candidate);
+    workspace.projection.project(&request, &workspace.iterate, &workspace.gradient, &mut workspace.candidate);
     frame.expand(&workspace.candidate, &mut workspace.trial);
     bounds_excess(scenario, &workspace.trial, &mut workspace.scratch) <= T::zero()
 }

@@ -141,37 +141,52 @@ impl<T: Real> Sweep<'_, T> {
         clear: Option<&mut impl FnMut(usize, usize) -> bool>,
     ) {
         let from = step.origin(first);
-        let row = |list: &'_ [T], at: usize| -> [T; CHUNK] {
-            let mut row = [T::INFINITY; CHUNK];
-            row.iter_mut().zip(list.get(at..at + length).unwrap_or_default()).for_each(|(to, &from)| *to = from);
-            row
+        let Self { landscape, cost, next, parents, interval } = self;
+        let row = |at: usize| landscape.get(at..at + length).unwrap_or_default();
+        let before = cost.get(from..from + length).unwrap_or_default();
+        let next = next.get_mut(first..first + length).unwrap_or_default();
+        let parents = parents.get_mut(first..first + length).unwrap_or_default();
+        let mut between = step.between().map(|back| row(first.wrapping_add_signed(back)));
+        let half = T::real(0.5);
+        let ends = row(first).iter().zip(row(from)).map(|(&near, &far)| (near + far) * half);
+        let count = T::from_count(step.between().count() + 1);
+        let weight = *interval / count;
+        let mut keep = |(((best, parent), &before), sum): (((&mut T, &mut u8), &T), T)| {
+            let total = before + sum * weight;
+            let is_better = total < *best;
+            *best = if is_better { total } else { *best };
+            *parent = if is_better { number } else { *parent };
         };
-        let (near, far) = (row(self.landscape, first), row(self.landscape, from));
-        let mut sum = [T::zero(); CHUNK];
-        for (sum, (&near, &far)) in sum.iter_mut().zip(near.iter().zip(&far)) {
-            *sum = (near + far) * T::real(0.5);
-        }
-        for back in step.between() {
-            let between = row(self.landscape, first.wrapping_add_signed(back));
-            sum.iter_mut().zip(&between).for_each(|(sum, &rate)| *sum += rate);
-        }
-        let weight = self.interval / T::from_count(step.between().count() + 1);
-        let before = row(self.cost, from);
-        let next = self.next.get_mut(first..first + length).unwrap_or_default().iter_mut();
-        let parents = self.parents.get_mut(first..first + length).unwrap_or_default().iter_mut();
-        let totals = before.iter().zip(&sum).map(|(&before, &sum)| before + sum * weight);
-        let cells = next.zip(parents).zip(totals);
+        let cells = next.iter_mut().zip(parents).zip(before);
         if let Some(clear) = clear {
-            for (index, ((best, parent), total)) in cells.enumerate() {
+            let mut sums = [T::zero(); CHUNK];
+            sums.iter_mut().zip(ends).for_each(|(sum, end)| *sum = end);
+            for row in between {
+                sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
+            }
+            for (index, (((best, parent), &before), &sum)) in cells.zip(&sums).enumerate() {
+                let total = before + sum * weight;
                 if total < *best && clear(from + index, first + index) {
                     (*best, *parent) = (total, number);
                 }
             }
-        } else {
-            for ((best, parent), total) in cells {
-                let is_better = total < *best;
-                *best = if is_better { total } else { *best };
-                *parent = if is_better { number } else { *parent };
+            return;
+        }
+        // Each number of cells between is a loop of its own, which the compiler makes one of vectors.
+        match [between.next(), between.next(), between.next()] {
+            [None, ..] => cells.zip(ends).for_each(&mut keep),
+            [Some(a), None, _] => cells.zip(ends.zip(a).map(|(sum, &a)| sum + a)).for_each(&mut keep),
+            [Some(a), Some(b), None] => {
+                cells.zip(ends.zip(a).zip(b).map(|((sum, &a), &b)| sum + a + b)).for_each(&mut keep);
+            }
+            [Some(a), Some(b), Some(c)] => {
+                let mut sums = [T::zero(); CHUNK];
+                let inner = ends.zip(a).zip(b).zip(c).map(|(((sum, &a), &b), &c)| sum + a + b + c);
+                sums.iter_mut().zip(inner).for_each(|(sum, inner)| *sum = inner);
+                for row in between {
+                    sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
+                }
+                cells.zip(sums).for_each(&mut keep);
             }
         }
     }
