@@ -11,7 +11,7 @@ use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, Prices, Variant};
+use crate::warm_start::{self, LARGE_TEAM, Prices, Variant};
 
 use super::coordinates::Frame;
 use super::feasible::largest_share;
@@ -107,7 +107,7 @@ where
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
         return (Status::Infeasible, closing);
     }
-    if settings.candidates > 1 {
+    if settings.candidates > 1 && scenario.agents.len() < LARGE_TEAM {
         race.change_sides(workspace, ledger, deadline);
     }
     let mut status = race.finish(workspace, ledger, deadline);

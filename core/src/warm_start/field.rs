@@ -21,6 +21,8 @@ use crate::trajectory::Trajectory;
 use super::equipment::{Doing, Prices, azimuth_of_nearest, levels};
 use super::{Blocked, Caution};
 
+/// Agents of a large team.
+pub(crate) const LARGE_TEAM: usize = 3;
 /// exp of more than this is held, for the sake of single precision.
 const EXPONENT_MAX: f64 = 60.0;
 /// Sharpness of worst-case terms by pass, over the spread of the metric along the path before.
@@ -43,6 +45,8 @@ pub(super) struct Field<'a, T, const DIM: usize, const NODES: usize, const AGENT
     pub(super) agent: &'a Agent<T, DIM>,
     tangents: [Tangent<T>; TERMS_MAX],
     prices: Prices<T>,
+    /// Whether what jamming does to others counts.
+    heeds_others: bool,
     /// Levels of jamming and of dropout to choose from, where there is such equipment.
     jam: Option<[T; 2]>,
     dropout: Option<[T; 2]>,
@@ -86,6 +90,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             agent,
             tangents: [none; TERMS_MAX],
             prices,
+            heeds_others: true,
             jam: agent.jammer.map(|jammer| levels(jammer.budget, duration)),
             dropout: agent.dropout.map(|dropout| levels(dropout.budget, duration)),
         };
@@ -98,6 +103,13 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             }
         }
         Some(field)
+    }
+
+    /// The same, for a lattice: in a large team, what jamming does to others is left to levels and polish, since it costs as
+    /// much to ask as the team is large.
+    pub(super) fn of_lattice(mut self) -> Self {
+        self.heeds_others = self.scenario.agents.len() < LARGE_TEAM;
+        self
     }
 
     /// Whether costs change from slice to slice with more than the terms' windows.
@@ -189,7 +201,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
                 // One an agent at most, so there is room; the same for the others.
                 let _ = slice.emitters.push(Emitter::new(index, jammer, position, level, azimuth));
             }
-            if self.agent.jammer.is_some() {
+            if self.agent.jammer.is_some() && self.heeds_others {
                 let _ = slice.others.push((position, self.weights(index, &window)));
             }
         }

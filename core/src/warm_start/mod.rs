@@ -44,6 +44,7 @@ use obstruction::{first_blocked, first_crossed};
 use sweep::{Block, Sweep};
 
 pub(crate) use equipment::{Prices, azimuth_of_nearest, equip};
+pub(crate) use field::LARGE_TEAM;
 pub use obstruction::{Blocked, Obstruction};
 
 /// Variants that [`variants`] lists at most.
@@ -129,6 +130,7 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
     let most = if is_urged { target.max(least).min(allowed) } else { allowed };
     let at = |share: f64| least + (most - least) * T::real(share);
     let late = |part: f64| (most * T::real(1.0 + part)).min(allowed);
+    let roomy = if is_urged { late(0.06) } else { at(0.5) };
     let list = if is_urged {
         [
             (4.0, 1.12, at(1.0)),
@@ -153,8 +155,11 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
         ]
     };
     let mut all = Vec::new();
+    // A large team takes one way, with time to spare: whatever is laid costs as much as the team is large.
+    let list = if scenario.agents.len() < LARGE_TEAM { list } else { [(4.0, 1.12, roomy); VARIANTS_MAX] };
     let span = list.iter().fold(T::zero(), |span, &(_, _, duration)| span.max(duration));
-    for (reach, inflation, duration) in list {
+    let count = if scenario.agents.len() < LARGE_TEAM { VARIANTS_MAX } else { 1 };
+    for (reach, inflation, duration) in list.into_iter().take(count) {
         // There is room for as many as are listed.
         let _ = all.push(Variant { reach: T::real(reach), inflation: T::real(inflation), duration, span });
     }
@@ -239,7 +244,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         (variant, caution, pass): (&Variant<T>, Caution, usize),
         scratch: &mut [Sample<T, DIM>],
     ) -> Result<T, ()> {
-        let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?;
+        let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?.of_lattice();
         let plan = Plan::new(&field, variant, CELLS, PARENTS);
         self.moves.collect(&plan.grid, plan.reach);
         let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
