@@ -23,7 +23,9 @@ pub(super) const POLISH_ITERATIONS: usize = 12;
 /// Refinement steps of one candidate.
 pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
-pub(super) const CANDIDATES_MAX: usize = 4;
+pub(super) const CANDIDATES_MAX: usize = 8;
+/// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
+const SECOND_CHANCE: f64 = 0.5;
 /// Lattice paths in a row that bring nothing, after which there are no more.
 const IDLE_MAX: usize = 3;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
@@ -67,7 +69,7 @@ where
         workspace.best.assign(&workspace.trial);
     }
     workspace.base.assign(&workspace.best);
-    let mut race = Race { scenario, settings, found: Found::nothing(), promise: T::INFINITY, polished: 0, idle: 0 };
+    let mut race = Race { scenario, settings, found: Found::nothing(), second: Found::nothing(), promise: T::INFINITY, polished: 0, idle: 0 };
     race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
@@ -110,7 +112,7 @@ where
     if settings.candidates > 1 && scenario.agents.len() < LARGE_TEAM {
         race.change_sides(workspace, ledger, deadline);
     }
-    let mut status = race.finish(workspace, ledger, deadline);
+    let mut status = race.finish_both(workspace, ledger, deadline);
     if settings.candidates > 1 {
         status = race.change_times(workspace, ledger, deadline).unwrap_or(status);
     }
@@ -202,6 +204,7 @@ fn unhurried<T: Real, const DIM: usize>(
 }
 
 /// The best candidate so far; while none is feasible, the one that comes nearest to that.
+#[derive(Clone, Copy)]
 struct Found<T> {
     status: Status,
     least: T,
@@ -249,6 +252,8 @@ struct Race<'a, T, const DIM: usize> {
     scenario: &'a View<'a, T, DIM>,
     settings: &'a Settings<T>,
     found: Found<T>,
+    /// The best that goes another way.
+    second: Found<T>,
     /// Least objective of all that were laid, before they were polished.
     promise: T,
     /// Lattice paths polished.
@@ -290,10 +295,21 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
         ledger.evaluations += 1;
         let status = polish(scenario, &short, workspace, ledger, deadline);
-        if status != Status::Infeasible && (ledger.best < found.least || found.least == T::INFINITY) {
-            *found = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
+        let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
+        let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
+        if status != Status::Infeasible && (new.least < found.least || found.least == T::INFINITY) {
+            if !is_alike {
+                self.second = *found;
+                workspace.second.assign(&workspace.champion);
+            }
+            self.found = new;
             workspace.champion.assign(&workspace.best);
             self.idle = 0;
+        } else if status != Status::Infeasible && new.least < self.second.least {
+            if !is_alike {
+                self.second = new;
+                workspace.second.assign(&workspace.best);
+            }
         } else if found.status == Status::Infeasible {
             let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
             if slack > found.slack {
@@ -323,6 +339,32 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
                 self.run(workspace, ledger, deadline);
             }
         }
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`, and the second too where it could gain as much and win.
+    fn finish_both<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        let (before, behind) = (self.found.least, self.second.least - self.found.least);
+        let mut status = self.finish(workspace, ledger, deadline);
+        let gained = before - ledger.best;
+        if self.settings.candidates > 1 && behind < gained * T::real(SECOND_CHANCE) && !deadline() {
+            workspace.champion.assign(&workspace.best);
+            let first = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
+            workspace.best.assign(&workspace.second);
+            (ledger.best, ledger.barrier) = (self.second.least, self.second.barrier);
+            let again = polish(self.scenario, self.settings, workspace, ledger, deadline);
+            if ledger.best < first.least {
+                status = again;
+            } else {
+                workspace.best.assign(&workspace.champion);
+                (ledger.best, ledger.barrier) = (first.least, first.barrier);
+            }
+        }
+        status
     }
 
     /// Polishes the champion to the end, in `workspace.best`.

@@ -34,6 +34,8 @@ pub struct Workspace<T, const DIM: usize, const NODES: usize, const SENSORS: usi
     /// What the global start begins with, and the best candidate so far.
     pub(super) base: Trajectory<T, DIM, NODES, AGENTS>,
     pub(super) champion: Trajectory<T, DIM, NODES, AGENTS>,
+    /// The best candidate that goes another way.
+    pub(super) second: Trajectory<T, DIM, NODES, AGENTS>,
     pub(super) lattice: Lattice<T, LATTICE_CELLS, LATTICE_PARENTS>,
     pub(super) scratch: [Sample<T, DIM>; SENSORS],
 }
@@ -58,6 +60,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
             refinement: Refinement::empty(),
             base: Trajectory::empty(),
             champion: Trajectory::empty(),
+            second: Trajectory::empty(),
             lattice: Lattice::new(),
             scratch: [const { Sample::zeros() }; SENSORS],
         }
