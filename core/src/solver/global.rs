@@ -25,7 +25,7 @@ pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 8;
 /// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
-const SECOND_CHANCE: f64 = 0.5;
+const SECOND_CHANCE: f64 = 2.0;
 /// Lattice paths in a row that bring nothing, after which there are no more.
 const IDLE_MAX: usize = 3;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
@@ -69,7 +69,7 @@ where
         workspace.best.assign(&workspace.trial);
     }
     workspace.base.assign(&workspace.best);
-    let mut race = Race { scenario, settings, found: Found::nothing(), second: Found::nothing(), promise: T::INFINITY, polished: 0, idle: 0 };
+    let mut race = Race { scenario, settings, found: Found::nothing(), second: Found::nothing(), ways: Ways::All, promise: T::INFINITY, polished: 0, idle: 0 };
     race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
@@ -109,13 +109,10 @@ where
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
         return (Status::Infeasible, closing);
     }
-    if settings.candidates > 1 && scenario.agents.len() < LARGE_TEAM {
+    if settings.candidates > 1 && !race.is_large() {
         race.change_sides(workspace, ledger, deadline);
     }
     let mut status = race.finish_both(workspace, ledger, deadline);
-    if settings.candidates > 1 {
-        status = race.change_times(workspace, ledger, deadline).unwrap_or(status);
-    }
     if has_equipment(scenario) {
         for _ in 0..EQUIPS_MAX {
             let Some(again) = equip_anew(scenario, settings, workspace, ledger, deadline) else { break };
@@ -211,11 +208,19 @@ struct Found<T> {
     slack: T,
     /// Where its refinement goes on.
     barrier: T,
+    /// What it was worth when its way had been polished once.
+    level: T,
 }
 
 impl<T: Real> Found<T> {
     fn nothing() -> Self {
-        Self { status: Status::Infeasible, least: T::INFINITY, slack: -T::INFINITY, barrier: T::zero() }
+        Self {
+            status: Status::Infeasible,
+            least: T::INFINITY,
+            slack: -T::INFINITY,
+            barrier: T::zero(),
+            level: T::INFINITY,
+        }
     }
 }
 
@@ -247,6 +252,15 @@ impl<T: Real, const DIM: usize> Way<T, DIM> {
     }
 }
 
+/// What a race looks for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ways {
+    /// The best way, and the best other.
+    All,
+    /// The best of one.
+    One,
+}
+
 /// Candidates, one after the other.
 struct Race<'a, T, const DIM: usize> {
     scenario: &'a View<'a, T, DIM>,
@@ -254,6 +268,7 @@ struct Race<'a, T, const DIM: usize> {
     found: Found<T>,
     /// The best that goes another way.
     second: Found<T>,
+    ways: Ways,
     /// Least objective of all that were laid, before they were polished.
     promise: T,
     /// Lattice paths polished.
@@ -295,10 +310,11 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
         ledger.evaluations += 1;
         let status = polish(scenario, &short, workspace, ledger, deadline);
-        let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
         let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
+        let level = if is_alike { found.level } else { ledger.best };
+        let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
         if status != Status::Infeasible && (new.least < found.least || found.least == T::INFINITY) {
-            if !is_alike {
+            if !is_alike && self.ways == Ways::All {
                 self.second = *found;
                 workspace.second.assign(&workspace.champion);
             }
@@ -306,7 +322,7 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
             workspace.champion.assign(&workspace.best);
             self.idle = 0;
         } else if status != Status::Infeasible && new.least < self.second.least {
-            if !is_alike {
+            if !is_alike && self.ways == Ways::All {
                 self.second = new;
                 workspace.second.assign(&workspace.best);
             }
@@ -348,23 +364,44 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
-        let (before, behind) = (self.found.least, self.second.least - self.found.least);
-        let mut status = self.finish(workspace, ledger, deadline);
-        let gained = before - ledger.best;
-        if self.settings.candidates > 1 && behind < gained * T::real(SECOND_CHANCE) && !deadline() {
-            workspace.champion.assign(&workspace.best);
-            let first = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier };
-            workspace.best.assign(&workspace.second);
-            (ledger.best, ledger.barrier) = (self.second.least, self.second.barrier);
-            let again = polish(self.scenario, self.settings, workspace, ledger, deadline);
-            if ledger.best < first.least {
-                status = again;
-            } else {
-                workspace.best.assign(&workspace.champion);
-                (ledger.best, ledger.barrier) = (first.least, first.barrier);
-            }
+        let (champion, second) = (self.found, self.second);
+        self.ways = Ways::One;
+        let status = self.complete(workspace, ledger, deadline);
+        let gained = champion.level - ledger.best;
+        let may_win = second.level - champion.level < gained * T::real(SECOND_CHANCE);
+        if !may_win || self.settings.candidates <= 1 || self.is_large() || deadline() {
+            return status;
         }
+        let first = Found { status, least: ledger.best, barrier: ledger.barrier, ..champion };
+        // The second becomes the champion, and the plan there is takes its place.
+        workspace.champion.assign(&workspace.second);
+        workspace.second.assign(&workspace.best);
+        self.found = second;
+        let again = self.complete(workspace, ledger, deadline);
+        if ledger.best < first.least {
+            return again;
+        }
+        workspace.best.assign(&workspace.second);
+        (ledger.best, ledger.barrier) = (first.least, first.barrier);
         status
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`, at whatever flight time is best.
+    fn complete<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        let status = self.finish(workspace, ledger, deadline);
+        if self.settings.candidates <= 1 {
+            return status;
+        }
+        self.change_times(workspace, ledger, deadline).unwrap_or(status)
+    }
+
+    fn is_large(&self) -> bool {
+        self.scenario.agents.len() >= LARGE_TEAM
     }
 
     /// Polishes the champion to the end, in `workspace.best`.
