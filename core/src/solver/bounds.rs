@@ -4,7 +4,9 @@
 //! | start | what is counted |
 //! |---|---|
 //! | straight, given | one descent and one refinement |
-//! | global | a projection a lattice path; a short descent and refinement for each candidate and the straight line; one in full |
+//! | global | for each lattice path, each challenger ([`super::neighbours`]) and the straight line, a projection and a short descent and refinement; in full, the best two at each of their flight times, and the plan with levels anew |
+//!
+//! With [`Settings::candidates`] at 1 there are no challengers, and one is polished in full.
 //!
 //! A descent has a stage that leads clear of regions and limits and then all others, each with its iterations; an iteration
 //! is one projection and one line search; a step of the refinement factors until the system is definite, and halves until
@@ -16,7 +18,7 @@
 use crate::math::Real;
 use crate::warm_start::VARIANTS_MAX;
 
-use super::{Settings, global, projected_gradient, refine};
+use super::{Settings, global, neighbours, projected_gradient, race, refine};
 
 /// The largest counts that an [`super::Outcome`] can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,23 +48,30 @@ impl<T: Real> Settings<T> {
     #[must_use]
     pub const fn bounds_everywhere(&self, agents: usize) -> Bounds {
         let short = self.improvement(
-            smaller(self.iterations, global::POLISH_ITERATIONS),
-            smaller(self.refinements, global::POLISH_REFINEMENTS),
+            smaller(self.iterations, race::POLISH_ITERATIONS),
+            smaller(self.refinements, race::POLISH_REFINEMENTS),
         );
         let long = self.improvement(self.iterations, self.refinements);
-        let candidates = smaller(self.candidates, global::CANDIDATES_MAX);
         let hurried = smaller(if self.variants == 0 { 1 } else { self.variants }, VARIANTS_MAX);
         let unhurried = smaller(self.variants, VARIANTS_MAX);
-        let laid = global::orders_max(agents) * (hurried + unhurried) + candidates;
-        let polished = candidates + 1;
+        let laid = global::orders_max(agents) * (hurried + unhurried);
+        // The plan and the second, each at one flight time after another; levels and directions anew.
+        let (challengers, finished) = if self.candidates > 1 {
+            let retimed = 2 * race::RETIMES_MAX;
+            (neighbours::SIDES_MAX + retimed * neighbours::TIMES_MAX, 2 + retimed + race::EQUIPS_MAX)
+        } else {
+            (0, 1)
+        };
+        let polished = 1 + laid + challengers;
+        let projected = laid + challengers;
         Bounds {
-            iterations: polished * short.iterations + long.iterations,
-            refinements: polished * short.refinements + long.refinements,
-            factorizations: polished * short.factorizations + long.factorizations,
-            evaluations: 1 + laid + polished * short.evaluations + long.evaluations,
-            projection_steps: laid * global::PROJECTION_STEPS
+            iterations: polished * short.iterations + finished * long.iterations,
+            refinements: polished * short.refinements + finished * long.refinements,
+            factorizations: polished * short.factorizations + finished * long.factorizations,
+            evaluations: 1 + projected + polished * (short.evaluations + 1) + finished * (long.evaluations + 1),
+            projection_steps: projected * global::PROJECTION_STEPS
                 + polished * short.projection_steps
-                + long.projection_steps,
+                + finished * long.projection_steps,
         }
     }
 

@@ -1,9 +1,7 @@
-//! The global start: lattice paths, made feasible; the most promising are polished for a few iterations, and the best
-//! of them is left to be polished to the end.
+//! The global start: lattice paths, made feasible, for [`super::race`] to find the best of.
 //!
-//! Limits: [`CANDIDATES_MAX`] are polished, for [`POLISH_ITERATIONS`] each. A team is searched agent by agent, each with
+//! Limits: lattice paths end once [`IDLE_MAX`] in a row brought nothing. A team is searched agent by agent, each with
 //! the others frozen, in every order where it is small and its agents affect each other.
-
 
 use crate::constraints::region::horizontal;
 use crate::constraints::{Constraint, separation};
@@ -11,30 +9,18 @@ use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, LARGE_TEAM, Prices, Variant};
+use crate::warm_start::{self, Prices, Variant};
 
 use super::coordinates::Frame;
 use super::feasible::largest_share;
 use super::projection::Request;
-use super::{Ledger, Obstacle, Settings, Status, Times, Workspace, guard, improve, neighbours, projected_gradient, refine};
+use super::race::{EQUIPS_MAX, Race, equip, equip_anew, has_equipment};
+use super::{Ledger, Obstacle, Settings, Status, Workspace, projected_gradient};
 
-/// Projected-gradient iterations of one candidate.
-pub(super) const POLISH_ITERATIONS: usize = 12;
-/// Refinement steps of one candidate.
-pub(super) const POLISH_REFINEMENTS: usize = 10;
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 8;
-/// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
-const SECOND_CHANCE: f64 = 2.0;
 /// Lattice paths in a row that bring nothing, after which there are no more.
 const IDLE_MAX: usize = 3;
-/// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
-const EQUIPS_MAX: usize = 2;
-const EQUIPS_GAIN: f64 = 1e-6;
-/// Times that the plan moves on to another flight time at which other nodes are before an instant.
-const TIMES_MAX: usize = 4;
-/// Largest distance of two paths that go the same way, over their length.
-const ALIKE: f64 = 0.04;
 /// Steps of the projection that makes a candidate feasible, and how exact it is.
 pub(super) const PROJECTION_STEPS: usize = 300;
 const PROJECTION_TOLERANCE: f64 = 1e-3;
@@ -69,7 +55,7 @@ where
         workspace.best.assign(&workspace.trial);
     }
     workspace.base.assign(&workspace.best);
-    let mut race = Race { scenario, settings, found: Found::nothing(), second: Found::nothing(), ways: Ways::All, promise: T::INFINITY, polished: 0, idle: 0 };
+    let mut race = Race::new(scenario, settings);
     race.run(workspace, ledger, deadline);
     let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
@@ -113,80 +99,13 @@ where
         race.change_sides(workspace, ledger, deadline);
     }
     let mut status = race.finish_both(workspace, ledger, deadline);
-    if has_equipment(scenario) {
+    if has_equipment(scenario) && settings.candidates > 1 {
         for _ in 0..EQUIPS_MAX {
             let Some(again) = equip_anew(scenario, settings, workspace, ledger, deadline) else { break };
             status = again;
         }
     }
     (status, None)
-}
-
-/// Lays levels and directions of the plan anew, and polishes what comes of it; `None` where that is no better.
-fn equip_anew<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    settings: &Settings<T>,
-    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ledger: &mut Ledger<T>,
-    deadline: &mut dyn FnMut() -> bool,
-) -> Option<Status>
-where
-    T: Real,
-{
-    if deadline() {
-        return None;
-    }
-    workspace.trial.assign(&workspace.best);
-    equip(scenario, workspace, &mut [Prices::default(); AGENTS]);
-    ledger.evaluations += 1;
-    let objective = objective::value(scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
-    let gain = ledger.best - objective;
-    let slack = guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch);
-    let is_better = gain > T::real(EQUIPS_GAIN) * ledger.best.abs().max(T::one()) && slack > T::zero();
-    if !is_better {
-        return None;
-    }
-    workspace.best.assign(&workspace.trial);
-    (ledger.best, ledger.barrier) = (objective, T::zero());
-    Some(polish(scenario, settings, workspace, ledger, deadline))
-}
-
-/// Whether there is anything to do besides flying.
-fn has_equipment<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
-    scenario.agents.iter().any(|agent| agent.jammer.is_some() || agent.dropout.is_some())
-}
-
-/// Lays levels and directions of all agents along their paths in `workspace.trial`.
-fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    prices: &mut [Prices<T>; AGENTS],
-) {
-    let Workspace { trial, lattice, scratch, .. } = workspace;
-    for (agent, prices) in prices.iter_mut().enumerate().take(scenario.agents.len()) {
-        *prices = warm_start::equip(scenario, trial, agent, lattice, scratch);
-    }
-}
-
-/// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
-/// from a lattice path, and led by the projected gradient otherwise.
-fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-    scenario: &View<'_, T, DIM>,
-    settings: &Settings<T>,
-    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ledger: &mut Ledger<T>,
-    deadline: &mut dyn FnMut() -> bool,
-) -> Status
-where
-    T: Real,
-{
-    if settings.refinements >= POLISH_REFINEMENTS
-        && !cfg!(feature = "first-order")
-        && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
-    {
-        return status;
-    }
-    improve(scenario, settings, workspace, ledger, deadline)
 }
 
 /// Flight times that no penalty on lateness speaks for, up to the last one allowed: where there is no way in time, a late
@@ -198,30 +117,6 @@ fn unhurried<T: Real, const DIM: usize>(
     let mut frame = scenario.frame;
     frame.time.penalty = T::zero();
     warm_start::variants(&View { frame, ..*scenario }).into_iter().filter(move |_| is_urged)
-}
-
-/// The best candidate so far; while none is feasible, the one that comes nearest to that.
-#[derive(Clone, Copy)]
-struct Found<T> {
-    status: Status,
-    least: T,
-    slack: T,
-    /// Where its refinement goes on.
-    barrier: T,
-    /// What it was worth when its way had been polished once.
-    level: T,
-}
-
-impl<T: Real> Found<T> {
-    fn nothing() -> Self {
-        Self {
-            status: Status::Infeasible,
-            least: T::INFINITY,
-            slack: -T::INFINITY,
-            barrier: T::zero(),
-            level: T::INFINITY,
-        }
-    }
 }
 
 /// What the lattice says of the way to the goal.
@@ -250,222 +145,6 @@ impl<T: Real, const DIM: usize> Way<T, DIM> {
             (Self::Unknown, Err(by)) => Self::Closed { by, duration },
         }
     }
-}
-
-/// What a race looks for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Ways {
-    /// The best way, and the best other.
-    All,
-    /// The best of one.
-    One,
-}
-
-/// Candidates, one after the other.
-struct Race<'a, T, const DIM: usize> {
-    scenario: &'a View<'a, T, DIM>,
-    settings: &'a Settings<T>,
-    found: Found<T>,
-    /// The best that goes another way.
-    second: Found<T>,
-    ways: Ways,
-    /// Least objective of all that were laid, before they were polished.
-    promise: T,
-    /// Lattice paths polished.
-    polished: usize,
-    /// Lattice paths in a row that brought nothing.
-    idle: usize,
-}
-
-impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
-    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, and does not
-    /// go where the champion goes.
-    fn admits<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        objective: T,
-        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> bool {
-        let is_record = objective < self.promise;
-        self.promise = self.promise.min(objective);
-        let is_known = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
-        let admits = (is_record || self.polished < self.settings.candidates) && !is_known;
-        self.polished += usize::from(admits);
-        admits
-    }
-
-    /// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
-    fn run<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) {
-        let Self { scenario, settings, found, .. } = self;
-        let short = Settings {
-            iterations: settings.iterations.min(POLISH_ITERATIONS),
-            refinements: settings.refinements.min(POLISH_REFINEMENTS),
-            ..**settings
-        };
-        ledger.barrier = T::zero();
-        ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
-        ledger.evaluations += 1;
-        let status = polish(scenario, &short, workspace, ledger, deadline);
-        let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
-        let level = if is_alike { found.level } else { ledger.best };
-        let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
-        if status != Status::Infeasible && (new.least < found.least || found.least == T::INFINITY) {
-            if !is_alike && self.ways == Ways::All {
-                self.second = *found;
-                workspace.second.assign(&workspace.champion);
-            }
-            self.found = new;
-            workspace.champion.assign(&workspace.best);
-            self.idle = 0;
-        } else if status != Status::Infeasible && new.least < self.second.least {
-            if !is_alike && self.ways == Ways::All {
-                self.second = new;
-                workspace.second.assign(&workspace.best);
-            }
-        } else if found.status == Status::Infeasible {
-            let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
-            if slack > found.slack {
-                found.slack = slack;
-                workspace.champion.assign(&workspace.best);
-            }
-        }
-    }
-}
-
-impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
-    /// Lets the champion pass what it passes on the other side.
-    fn change_sides<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) {
-        for passed in neighbours::passed(self.scenario, &workspace.champion) {
-            if deadline() {
-                return;
-            }
-            workspace.trial.assign(&workspace.champion);
-            let is_changed = neighbours::change_side(self.scenario, &mut workspace.trial, &passed);
-            if is_changed && project(self.scenario, self.settings, workspace, ledger).is_some() {
-                workspace.best.assign(&workspace.trial);
-                self.run(workspace, ledger, deadline);
-            }
-        }
-    }
-
-    /// Polishes the champion to the end, in `workspace.best`, and the second too where it could gain as much and win.
-    fn finish_both<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) -> Status {
-        let (champion, second) = (self.found, self.second);
-        self.ways = Ways::One;
-        let status = self.complete(workspace, ledger, deadline);
-        let gained = champion.level - ledger.best;
-        let may_win = second.level - champion.level < gained * T::real(SECOND_CHANCE);
-        if !may_win || self.settings.candidates <= 1 || self.is_large() || deadline() {
-            return status;
-        }
-        let first = Found { status, least: ledger.best, barrier: ledger.barrier, ..champion };
-        // The second becomes the champion, and the plan there is takes its place.
-        workspace.champion.assign(&workspace.second);
-        workspace.second.assign(&workspace.best);
-        self.found = second;
-        let again = self.complete(workspace, ledger, deadline);
-        if ledger.best < first.least {
-            return again;
-        }
-        workspace.best.assign(&workspace.second);
-        (ledger.best, ledger.barrier) = (first.least, first.barrier);
-        status
-    }
-
-    /// Polishes the champion to the end, in `workspace.best`, at whatever flight time is best.
-    fn complete<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) -> Status {
-        let status = self.finish(workspace, ledger, deadline);
-        if self.settings.candidates <= 1 {
-            return status;
-        }
-        self.change_times(workspace, ledger, deadline).unwrap_or(status)
-    }
-
-    fn is_large(&self) -> bool {
-        self.scenario.agents.len() >= LARGE_TEAM
-    }
-
-    /// Polishes the champion to the end, in `workspace.best`.
-    fn finish<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) -> Status {
-        workspace.best.assign(&workspace.champion);
-        (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
-        ledger.times = Times::Held;
-        polish(self.scenario, self.settings, workspace, ledger, deadline)
-    }
-
-    /// Flies the plan a little slower or faster, so that other nodes are before the instants at which terms change; the
-    /// status of the last that was better.
-    fn change_times<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        ledger: &mut Ledger<T>,
-        deadline: &mut dyn FnMut() -> bool,
-    ) -> Option<Status> {
-        let mut status = None;
-        let allowed = self.scenario.frame.time.max - self.scenario.frame.start_time;
-        for _ in 0..TIMES_MAX {
-            workspace.champion.assign(&workspace.best);
-            (self.found.least, self.found.barrier) = (ledger.best, ledger.barrier);
-            let known = self.found.least;
-            for duration in neighbours::other_times(self.scenario, workspace.champion.duration()) {
-                if deadline() || duration > allowed {
-                    continue;
-                }
-                workspace.trial.assign(&workspace.champion);
-                workspace.trial.set_duration(self.scenario.frame.start_time, duration);
-                if project(self.scenario, self.settings, workspace, ledger).is_some() {
-                    workspace.best.assign(&workspace.trial);
-                    self.run(workspace, ledger, deadline);
-                }
-            }
-            let is_better = self.found.least < known - known.abs().max(T::one()) * T::real(EQUIPS_GAIN);
-            if !is_better {
-                workspace.best.assign(&workspace.champion);
-                (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
-                break;
-            }
-            status = Some(self.finish(workspace, ledger, deadline));
-        }
-        status
-    }
-}
-
-/// Whether two trajectories go the same way, side by side, in about the same time.
-fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
-    one: &Trajectory<T, DIM, NODES, AGENTS>,
-    other: &Trajectory<T, DIM, NODES, AGENTS>,
-) -> bool {
-    let nodes = one.nodes();
-    one.active().iter().zip(other.active()).all(|(one, other)| {
-        let steps = one.path.iter().zip(one.path.iter().skip(1)).take(nodes - 1);
-        let length = steps.fold(T::zero(), |length, (from, to)| length + norm(&(to - from)));
-        let apart = one.path.iter().zip(&other.path).take(nodes).map(|(one, other)| norm(&(one - other)));
-        apart.fold(T::zero(), T::max) < length * T::real(ALIKE)
-    })
 }
 
 /// Orders of so many agents to try at most.
@@ -568,7 +247,7 @@ fn at_place(order: usize, place: usize, agents: usize) -> usize {
 
 /// Makes `workspace.trial` feasible by projection, with `workspace.base` as what is known to be feasible; its
 /// objective, or `None` where it is not feasible after all.
-fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+pub(super) fn project<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,

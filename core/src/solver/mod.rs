@@ -24,6 +24,7 @@
 //! - `obstacle`: what stands in the way where no feasible plan is found.
 //! - `bounds`: the most that a plan takes, from the settings alone.
 //! - `neighbours`: challengers of a good path, one decision changed.
+//! - `race`: candidates polished, challenged and compared.
 //! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
 //!
 //! Limits: one basin from [`Start::Straight`] or [`Start::Given`]; the best of a few from [`Start::Global`].
@@ -39,6 +40,7 @@ mod neighbours;
 mod obstacle;
 mod projected_gradient;
 mod projection;
+mod race;
 mod refine;
 mod settings;
 mod start;

@@ -9,19 +9,20 @@
 //! | k | node nearest to what is passed | |
 //! | w | width of the detour | nodes |
 //!
-//! Limits: one decision at a time; sides are those in the horizontal plane.
+//! Limits: one decision at a time; sides are those in the horizontal plane; [`TIMES_MAX`] other times, those of the terms
+//! that come first.
 
 use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real, norm};
-use crate::scenario::{Shape, TERMS_MAX, View, Window};
+use crate::scenario::{Shape, View, Window};
 use crate::trajectory::Trajectory;
 
 /// Things whose other side is tried, nearest first.
 pub(super) const SIDES_MAX: usize = 6;
-/// Instants at which terms change, at most.
-pub(super) const INSTANTS_MAX: usize = 2 * TERMS_MAX;
+/// Flight times that are tried at once, at most.
+pub(super) const TIMES_MAX: usize = 8;
 /// Largest distance from the path at which a side is a decision, over the length of the straight line.
 const NEAR: f64 = 0.12;
 /// Width of a detour over its height.
@@ -156,10 +157,7 @@ pub(super) fn change_side<T: Real, const DIM: usize, const NODES: usize, const A
 
 /// Flight times, the nearest shorter and longer ones, at which one node more or less is before an instant at which terms
 /// change, s.
-pub(super) fn other_times<T: Real, const DIM: usize>(
-    scenario: &View<'_, T, DIM>,
-    duration: T,
-) -> Vec<T, { 2 * INSTANTS_MAX }> {
+pub(super) fn other_times<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T) -> Vec<T, TIMES_MAX> {
     let mut times = Vec::new();
     let count = T::from_count(scenario.frame.intervals.max(1));
     let start = scenario.frame.start_time;

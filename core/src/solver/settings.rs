@@ -10,7 +10,8 @@ use super::global::CANDIDATES_MAX;
 pub struct Settings<T> {
     /// Largest number of lattice searches of [`super::Start::Global`] for each penalty on lateness; at least one is made.
     pub variants: usize,
-    /// Largest number of lattice paths that [`super::Start::Global`] polishes, besides the straight line.
+    /// Number of lattice paths that [`super::Start::Global`] polishes whatever they promise; later ones it polishes where they
+    /// promise more than all before. With more than one, the best is challenged, and the best two are polished to the end.
     pub candidates: usize,
     /// Largest number of projected-gradient iterations, over all smoothing stages.
     pub iterations: usize,

@@ -293,14 +293,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             let _ = emitters.push(Emitter::new(self.index, jammer, *position, level, azimuth));
         }
         let betrayal = self.agent.jammer.map_or(Betrayal::None, |jammer| jammer.betrayal);
-        let here = Situation {
-            time: slice.time,
-            position: *position,
-            reference: None,
-            dropout,
-            level,
-            betrayal,
-        };
+        let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
         let values = forward(self.scenario, &here, &emitters, slice.own.needs, scratch).values;
         if self.scenario.limits.iter().any(|limit| is_outside(limit, &values)) {
             return T::INFINITY;

@@ -505,7 +505,8 @@ impl<T: Real, const DIM: usize> Plan<T, DIM> {
         let agent = field.agent;
         let domain = &field.scenario.frame.domain;
         let length = agent.speed_max * variant.duration;
-        let far = agent.speed_max * variant.span.max(variant.duration) * T::real(INFLATION_MAX).max(variant.inflation);
+        let far =
+            agent.speed_max * variant.span.max(variant.duration) * T::real(INFLATION_MAX).max(variant.inflation);
         let mut cells = cells_max;
         loop {
             let grid = Grid::new(domain, (&agent.start, &agent.goal), far, cells);

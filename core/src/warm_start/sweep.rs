@@ -32,7 +32,8 @@ impl<const DIM: usize> Block<DIM> {
     /// The smallest block that holds both.
     pub(super) fn hull(&self, other: &Self) -> Self {
         let mut hull = *self;
-        for ((low, high), (&a, &b)) in hull.low.iter_mut().zip(&mut hull.high).zip(other.low.iter().zip(&other.high)) {
+        for ((low, high), (&a, &b)) in hull.low.iter_mut().zip(&mut hull.high).zip(other.low.iter().zip(&other.high))
+        {
             (*low, *high) = ((*low).min(a), (*high).max(b));
         }
         hull
@@ -41,7 +42,8 @@ impl<const DIM: usize> Block<DIM> {
     /// What is in both; `None` where nothing is.
     pub(super) fn meet(&self, other: &Self) -> Option<Self> {
         let mut both = *self;
-        for ((low, high), (&a, &b)) in both.low.iter_mut().zip(&mut both.high).zip(other.low.iter().zip(&other.high)) {
+        for ((low, high), (&a, &b)) in both.low.iter_mut().zip(&mut both.high).zip(other.low.iter().zip(&other.high))
+        {
             (*low, *high) = ((*low).max(a), (*high).min(b));
             if *low > *high {
                 return None;

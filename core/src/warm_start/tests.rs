@@ -233,24 +233,71 @@ fn finds_its_way_in_three_dimensions() {
     let mut path = Trajectory::<f64, 3, 41, 1>::straight(&view, 110.0).unwrap();
     let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
     let mut scratch = [Sample::default(); 4];
-    let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0 };
+    let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0, span: 110.0 };
     search(&view, &mut path, 0, (&variant, Prices::default()), &mut lattice, &mut scratch).unwrap();
     // The domain is a sheet: over it is the only way around.
     let highest = path.tracks[0].path[..41].iter().map(|place| place[2]).fold(0.0, f64::max);
     assert!(highest > 1.5, "highest {highest}");
 }
 
-/// In three dimensions there are more moves within reach than the list holds.
+/// In three dimensions there are more moves within reach than the list holds; every one that leads from a block to another
+/// stays in the grid.
 #[test]
-fn a_full_list_of_moves_is_walked_to_its_end() {
+fn a_full_list_of_moves_stays_in_the_grid() {
     let corner = Point::<f64, 3>::new(10.0, 10.0, 10.0);
     let domain = Domain { min: Point::zeros(), max: corner };
     let grid = grid::Grid::new(&domain, (&Point::zeros(), &corner), 30.0, 1024);
     let mut moves = grid::Moves::none();
     moves.collect(&grid, 10.0 * grid.size());
-    let middle = grid.cell(&(corner * 0.5));
-    let (at, _) = grid.iter().nth(middle).expect("a cell of the grid");
-    let numbers: List<usize> = moves.arriving(&grid, (middle, at)).map(|(number, ..)| usize::from(number)).collect();
-    assert!(numbers.windows(2).all(|pair| pair[0] < pair[1]), "{numbers:?}");
-    assert!(numbers.last().is_some_and(|last| *last > 200), "{numbers:?}");
+    assert!(moves.all().len() > 200, "{}", moves.all().len());
+    let (mut cost, mut next) = (List::from([1.0; 1024]), List::from([f64::INFINITY; 1024]));
+    let (landscape, mut parents) = (List::from([1.0; 1024]), List::from([0_u8; 1024]));
+    let whole = sweep::Block::whole(&grid.counts);
+    let cells = grid.cells();
+    cost.truncate(cells);
+    let mut sweep =
+        Sweep { landscape: &landscape, cost: &cost, next: &mut next, parents: &mut parents, interval: 2.0 };
+    sweep.run(&grid, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
+    // The landscape is level: all that counts is that every cell is reached, and from a cell.
+    assert!(next[..cells].iter().all(|&total| total == 3.0), "{next:?}");
+    for (cell, &parent) in parents.iter().enumerate().take(cells) {
+        assert!(moves.origin(parent, cell) < cells);
+    }
+}
+
+/// Rows that end at different borders, and moves that see cells between, come out as the definition has it.
+#[test]
+fn a_sweep_takes_the_least_of_all_moves() {
+    let domain = Domain { min: Place::zeros(), max: Place::new(10.0, 7.0) };
+    let grid = grid::Grid::new(&domain, (&Place::zeros(), &Place::new(10.0, 7.0)), 30.0, 400);
+    let mut moves = grid::Moves::none();
+    moves.collect(&grid, 4.2 * grid.size());
+    let mut random = 1_u32;
+    let mut draw = || {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(random >> 8) / f64::from(1 << 24)
+    };
+    let cells = grid.cells();
+    let landscape: List<f64> = (0..cells).map(|_| draw()).collect();
+    let cost: List<f64> = (0..cells).map(|_| draw()).collect();
+    let (mut next, mut parents) = (List::from([f64::INFINITY; 400]), List::from([0_u8; 400]));
+    let whole = sweep::Block::whole(&grid.counts);
+    let mut sweep =
+        Sweep { landscape: &landscape, cost: &cost, next: &mut next, parents: &mut parents, interval: 0.5 };
+    sweep.run(&grid, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
+    for to in 0..cells {
+        let at = grid.coordinates(to);
+        let least = moves.all().iter().filter_map(|step| {
+            let from = [0, 1].map(|axis| at[axis] as i64 - i64::from(step.offset()[axis]));
+            let inside = (0..2).all(|axis| (0..grid.counts[axis] as i64).contains(&from[axis]));
+            inside.then(|| {
+                let between: List<f64> = step.between().map(|back| landscape[to.wrapping_add_signed(back)]).collect();
+                let from = step.origin(to);
+                let sum = f64::midpoint(landscape[from], landscape[to]) + between.iter().sum::<f64>();
+                cost[from] + 0.5 * sum / (between.len() + 1) as f64
+            })
+        });
+        let least = least.fold(f64::INFINITY, f64::min);
+        assert!((next[to] - least).abs() < 1e-12, "{to}: {} for {least}", next[to]);
+    }
 }

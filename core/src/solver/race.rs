@@ -1,0 +1,350 @@
+//! The race of candidates: each is polished for a few iterations, the best is challenged, and the best two are polished to
+//! the end.
+//!
+//! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`] a candidate; one second; two ways are alike where they are side by
+//! side, whatever else differs.
+
+use crate::math::{Real, norm};
+use crate::objective::{self, Extreme};
+use crate::scenario::View;
+use crate::trajectory::Trajectory;
+use crate::warm_start::{self, LARGE_TEAM, Prices};
+
+use super::global::project;
+use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbours, refine};
+
+/// Projected-gradient iterations of one candidate.
+pub(super) const POLISH_ITERATIONS: usize = 12;
+/// Refinement steps of one candidate.
+pub(super) const POLISH_REFINEMENTS: usize = 10;
+/// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
+const SECOND_CHANCE: f64 = 2.0;
+/// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
+pub(super) const EQUIPS_MAX: usize = 2;
+const EQUIPS_GAIN: f64 = 1e-6;
+/// Times that a plan moves on to another flight time at which other nodes are before an instant.
+pub(super) const RETIMES_MAX: usize = 4;
+/// Largest distance of two paths that go the same way, over their length.
+const ALIKE: f64 = 0.04;
+
+/// The best candidate so far; while none is feasible, the one that comes nearest to that.
+#[derive(Clone, Copy)]
+pub(super) struct Found<T> {
+    pub(super) status: Status,
+    least: T,
+    slack: T,
+    /// Where its refinement goes on.
+    barrier: T,
+    /// What it was worth when its way had been polished once.
+    level: T,
+}
+
+impl<T: Real> Found<T> {
+    fn nothing() -> Self {
+        Self {
+            status: Status::Infeasible,
+            least: T::INFINITY,
+            slack: -T::INFINITY,
+            barrier: T::zero(),
+            level: T::INFINITY,
+        }
+    }
+}
+
+/// What a race looks for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ways {
+    /// The best way, and the best other.
+    All,
+    /// The best of one.
+    One,
+}
+
+/// Candidates, one after the other.
+pub(super) struct Race<'a, T, const DIM: usize> {
+    scenario: &'a View<'a, T, DIM>,
+    settings: &'a Settings<T>,
+    pub(super) found: Found<T>,
+    /// The best that goes another way.
+    second: Found<T>,
+    ways: Ways,
+    /// Least objective of all that were laid, before they were polished.
+    promise: T,
+    /// Lattice paths polished.
+    pub(super) polished: usize,
+    /// Lattice paths in a row that brought nothing.
+    pub(super) idle: usize,
+}
+
+impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
+    /// A race that nobody has run in.
+    pub(super) fn new(scenario: &'a View<'a, T, DIM>, settings: &'a Settings<T>) -> Self {
+        let none = Found::nothing();
+        Self {
+            scenario,
+            settings,
+            found: none,
+            second: none,
+            ways: Ways::All,
+            promise: T::INFINITY,
+            polished: 0,
+            idle: 0,
+        }
+    }
+
+    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, and does not
+    /// go where the champion goes.
+    pub(super) fn admits<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        objective: T,
+        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> bool {
+        let is_record = objective < self.promise;
+        self.promise = self.promise.min(objective);
+        let is_known = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
+        let admits = (is_record || self.polished < self.settings.candidates) && !is_known;
+        self.polished += usize::from(admits);
+        admits
+    }
+
+    /// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
+    pub(super) fn run<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        let Self { scenario, settings, found, .. } = self;
+        let short = Settings {
+            iterations: settings.iterations.min(POLISH_ITERATIONS),
+            refinements: settings.refinements.min(POLISH_REFINEMENTS),
+            ..**settings
+        };
+        ledger.barrier = T::zero();
+        ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
+        ledger.evaluations += 1;
+        let status = polish(scenario, &short, workspace, ledger, deadline);
+        let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
+        let level = if is_alike { found.level } else { ledger.best };
+        let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
+        if status != Status::Infeasible && (new.least < found.least || found.least == T::INFINITY) {
+            if !is_alike && self.ways == Ways::All {
+                self.second = *found;
+                workspace.second.assign(&workspace.champion);
+            }
+            self.found = new;
+            workspace.champion.assign(&workspace.best);
+            self.idle = 0;
+        } else if status != Status::Infeasible && new.least < self.second.least {
+            if !is_alike && self.ways == Ways::All {
+                self.second = new;
+                workspace.second.assign(&workspace.best);
+            }
+        } else if found.status == Status::Infeasible {
+            let slack = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
+            if slack > found.slack {
+                found.slack = slack;
+                workspace.champion.assign(&workspace.best);
+            }
+        }
+    }
+}
+
+impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
+    /// Lets the champion pass what it passes on the other side.
+    pub(super) fn change_sides<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        for passed in neighbours::passed(self.scenario, &workspace.champion) {
+            if deadline() {
+                return;
+            }
+            workspace.trial.assign(&workspace.champion);
+            let is_changed = neighbours::change_side(self.scenario, &mut workspace.trial, &passed);
+            if is_changed && project(self.scenario, self.settings, workspace, ledger).is_some() {
+                workspace.best.assign(&workspace.trial);
+                self.run(workspace, ledger, deadline);
+            }
+        }
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`, and the second too where it could gain as much and win.
+    pub(super) fn finish_both<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        let (champion, second) = (self.found, self.second);
+        self.ways = Ways::One;
+        let status = self.complete(workspace, ledger, deadline);
+        let gained = champion.level - ledger.best;
+        let may_win = second.level - champion.level < gained * T::real(SECOND_CHANCE);
+        if !may_win || self.settings.candidates <= 1 || self.is_large() || deadline() {
+            return status;
+        }
+        let first = Found { status, least: ledger.best, barrier: ledger.barrier, ..champion };
+        // The second becomes the champion, and the plan there is takes its place.
+        workspace.champion.assign(&workspace.second);
+        workspace.second.assign(&workspace.best);
+        self.found = second;
+        let again = self.complete(workspace, ledger, deadline);
+        if ledger.best < first.least {
+            return again;
+        }
+        workspace.best.assign(&workspace.second);
+        (ledger.best, ledger.barrier) = (first.least, first.barrier);
+        status
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`, at whatever flight time is best.
+    fn complete<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        let status = self.finish(workspace, ledger, deadline);
+        if self.settings.candidates <= 1 {
+            return status;
+        }
+        self.change_times(workspace, ledger, deadline).unwrap_or(status)
+    }
+
+    pub(super) fn is_large(&self) -> bool {
+        self.scenario.agents.len() >= LARGE_TEAM
+    }
+
+    /// Polishes the champion to the end, in `workspace.best`.
+    fn finish<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Status {
+        workspace.best.assign(&workspace.champion);
+        (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
+        ledger.times = Times::Held;
+        polish(self.scenario, self.settings, workspace, ledger, deadline)
+    }
+
+    /// Flies the plan a little slower or faster, so that other nodes are before the instants at which terms change; the
+    /// status of the last that was better.
+    fn change_times<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Option<Status> {
+        let mut status = None;
+        let allowed = self.scenario.frame.time.max - self.scenario.frame.start_time;
+        for _ in 0..RETIMES_MAX {
+            workspace.champion.assign(&workspace.best);
+            (self.found.least, self.found.barrier) = (ledger.best, ledger.barrier);
+            let known = self.found.least;
+            for duration in neighbours::other_times(self.scenario, workspace.champion.duration()) {
+                if deadline() || duration > allowed {
+                    continue;
+                }
+                workspace.trial.assign(&workspace.champion);
+                workspace.trial.set_duration(self.scenario.frame.start_time, duration);
+                if project(self.scenario, self.settings, workspace, ledger).is_some() {
+                    workspace.best.assign(&workspace.trial);
+                    self.run(workspace, ledger, deadline);
+                }
+            }
+            let is_better = self.found.least < known - known.abs().max(T::one()) * T::real(EQUIPS_GAIN);
+            if !is_better {
+                workspace.best.assign(&workspace.champion);
+                (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
+                break;
+            }
+            status = Some(self.finish(workspace, ledger, deadline));
+        }
+        status
+    }
+}
+
+/// Whether two trajectories go the same way, side by side, in about the same time.
+fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    one: &Trajectory<T, DIM, NODES, AGENTS>,
+    other: &Trajectory<T, DIM, NODES, AGENTS>,
+) -> bool {
+    let nodes = one.nodes();
+    one.active().iter().zip(other.active()).all(|(one, other)| {
+        let steps = one.path.iter().zip(one.path.iter().skip(1)).take(nodes - 1);
+        let length = steps.fold(T::zero(), |length, (from, to)| length + norm(&(to - from)));
+        let apart = one.path.iter().zip(&other.path).take(nodes).map(|(one, other)| norm(&(one - other)));
+        apart.fold(T::zero(), T::max) < length * T::real(ALIKE)
+    })
+}
+
+/// Lays levels and directions of the plan anew, and polishes what comes of it; `None` where that is no better.
+pub(super) fn equip_anew<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Option<Status>
+where
+    T: Real,
+{
+    if deadline() {
+        return None;
+    }
+    workspace.trial.assign(&workspace.best);
+    equip(scenario, workspace, &mut [Prices::default(); AGENTS]);
+    ledger.evaluations += 1;
+    let objective = objective::value(scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
+    let gain = ledger.best - objective;
+    let slack = guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch);
+    let is_better = gain > T::real(EQUIPS_GAIN) * ledger.best.abs().max(T::one()) && slack > T::zero();
+    if !is_better {
+        return None;
+    }
+    workspace.best.assign(&workspace.trial);
+    (ledger.best, ledger.barrier) = (objective, T::zero());
+    Some(polish(scenario, settings, workspace, ledger, deadline))
+}
+
+/// Whether there is anything to do besides flying.
+pub(super) fn has_equipment<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
+    scenario.agents.iter().any(|agent| agent.jammer.is_some() || agent.dropout.is_some())
+}
+
+/// Lays levels and directions of all agents along their paths in `workspace.trial`.
+pub(super) fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    prices: &mut [Prices<T>; AGENTS],
+) {
+    let Workspace { trial, lattice, scratch, .. } = workspace;
+    for (agent, prices) in prices.iter_mut().enumerate().take(scenario.agents.len()) {
+        *prices = warm_start::equip(scenario, trial, agent, lattice, scratch);
+    }
+}
+
+/// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
+/// from a lattice path, and led by the projected gradient otherwise.
+fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Status
+where
+    T: Real,
+{
+    if settings.refinements >= POLISH_REFINEMENTS
+        && !cfg!(feature = "first-order")
+        && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
+    {
+        return status;
+    }
+    improve(scenario, settings, workspace, ledger, deadline)
+}
