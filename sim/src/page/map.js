@@ -3,6 +3,11 @@
 const INK = '#1a1a1a';
 const FAINTEST = 0.02; // jamming below this is not drawn
 
+/** The ways that have a beginning: one that nobody has flown yet has no place. */
+function ways(data) {
+  return data.paths.filter((path) => path.times.length > 0);
+}
+
 /** The place on a way of `times`, `x`, `y` at an instant: at rest before and after. */
 function placeAt(way, time) {
   const { times, x, y } = way;
@@ -232,8 +237,8 @@ class FlightMap {
     const pen = new Pen(plot);
     this.regions(pen);
     const { time } = this.moment;
-    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.step(pen, path);
-    const main = this.data.paths.filter((path) => path.kind !== 'step');
+    for (const path of ways(this.data).filter((path) => path.kind === 'step')) this.step(pen, path);
+    const main = ways(this.data).filter((path) => path.kind !== 'step');
     for (const path of main) {
       const flown = path.kind === 'flown';
       this.route(pen, path, DASHES[path.agent % DASHES.length], flown ? time : Infinity);
@@ -275,11 +280,9 @@ class FlightMap {
     for (const rim of [[8.6, '#ffffff'], [6.4, colour], [2.6, '#ffffff']]) {
       for (const [a, b] of legs((node) => path.dropout[node] >= 0.5)) pen.line([a, b], rim[1], rim[0]);
     }
-    if (path.x.length) {
-      const end = path.x.length - 1;
-      pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
-      pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
-    }
+    const end = path.x.length - 1;
+    pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
+    pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
   }
 
   regions(pen) {
