@@ -1,6 +1,7 @@
 // The map: landscape, regions, sensors, paths and vehicles at one instant, on axes of uPlot.
 
 const INK = '#1a1a1a';
+const FINER = 8; // pixels along a cell of a landscape
 const FAINTEST = 0.02; // jamming below this is not drawn
 
 /** The ways that have a beginning: one that nobody has flown yet has no place. */
@@ -31,6 +32,7 @@ class Landscape {
     this.colours = colours.map((css) => [1, 3, 5].map((at) => parseInt(css.slice(at, at + 2), 16)));
     this.letters = new Map([...'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/'].map((c, i) => [c, i]));
     this.canvas = document.createElement('canvas');
+    this.smooth = document.createElement('canvas');
     this.drawn = '';
   }
 
@@ -58,7 +60,7 @@ class Landscape {
     const frame = this.frame(time);
     const { columns, rows } = this.fields;
     const key = `${metric} ${frame}`;
-    if (this.drawn === key) return this.canvas;
+    if (this.drawn === key) return this.smooth;
     this.canvas.width = columns;
     this.canvas.height = rows;
     const context = this.canvas.getContext('2d');
@@ -72,8 +74,12 @@ class Landscape {
       pixels.data.set([...rgb, 255], at);
     }
     context.putImageData(pixels, 0, 0);
+    // A printer does not smooth what it draws larger.
+    this.smooth.width = FINER * columns;
+    this.smooth.height = FINER * rows;
+    this.smooth.getContext('2d').drawImage(this.canvas, 0, 0, this.smooth.width, this.smooth.height);
     this.drawn = key;
-    return this.canvas;
+    return this.smooth;
   }
 
   /** The value at shares of the width and height, as words; empty where there is none. */
