@@ -82,7 +82,7 @@ fn plans_that_follow_each_other_within_an_interval_keep_its_length() {
     let (world, first) = begin();
     let end = first.duration;
     let mut flying = first;
-    for number in 1..=100 {
+    for number in 1..=80 {
         let seam = 0.15 * number as f64;
         let job = rest_at(number, &world, &flying, seam).expect("enough is left");
         let share = (end - seam) / end;
