@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use quietpath_bridge::file::{PlanFile, ScenarioFile};
 use quietpath_bridge::planning::{Memory, Options, assess, plan};
-use quietpath_bridge::replan::job::{Rejected, rest};
+use quietpath_bridge::replan::job::{Rejected, rest, rest_at};
 use quietpath_bridge::replan::worker::carry_out;
 use quietpath_bridge::replan::{Answer, Job, Observation, Worker, judge};
 use quietpath_bridge::setpoint::Curve;
@@ -75,6 +75,20 @@ fn the_rest_is_planned_around_a_sensor_that_moved_and_takes_over_smoothly() {
         flying = plan;
     }
     assert!(rest(9, &world, &flying, 39.0).is_none());
+}
+
+#[test]
+fn plans_that_follow_each_other_within_an_interval_keep_its_length() {
+    let (world, first) = begin();
+    let end = first.duration;
+    let mut flying = first;
+    for number in 1..=80 {
+        let seam = 0.15 * number as f64;
+        let job = rest_at(number, &world, &flying, seam).expect("enough is left");
+        let share = (end - seam) / end;
+        assert_eq!(job.scenario.intervals, (20.0 * share) as usize, "at {seam:.2} s");
+        flying = job.tail;
+    }
 }
 
 #[test]

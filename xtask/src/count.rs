@@ -8,26 +8,60 @@ use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, bail};
+use clap::ValueEnum;
 
 /// Functions that are listed.
 const LISTED: usize = 25;
 /// Part of a name that a listed function has.
 const OURS: &str = "quietpath_core::";
 
+/// How the program that is counted is compiled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Profile {
+    /// As it is used.
+    Release,
+    /// As it is tested: its figures are higher, and change with the same changes.
+    Dev,
+}
+
+impl Profile {
+    /// What builds it.
+    const fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Release => &["build", "--release", "--quiet", "--package", "quietpath-tests", "--bin", "one_plan"],
+            // Tests of a package are built with its programs, and all of the workspace with the same features.
+            Self::Dev => &["test", "--no-run", "--quiet", "--workspace", "--test", "interoperate"],
+        }
+    }
+
+    /// Where it lies.
+    const fn program(self) -> &'static str {
+        match self {
+            Self::Release => "target/release/one_plan",
+            Self::Dev => "target/debug/one_plan",
+        }
+    }
+}
+
 /// Counts, and prints; false where a program failed.
 ///
 /// # Errors
 /// A program that cannot be started: cargo, valgrind.
-pub fn count(scenario: &str, top: &Path) -> anyhow::Result<bool> {
+pub fn count(scenario: &str, profile: Profile, top: &Path) -> anyhow::Result<bool> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let arguments = ["build", "--release", "--quiet", "--package", "quietpath-tests", "--bin", "one_plan"];
-    if !Command::new(cargo).args(arguments).current_dir(top).status().context("cannot start cargo")?.success() {
+    if !Command::new(cargo)
+        .args(profile.arguments())
+        .current_dir(top)
+        .status()
+        .context("cannot start cargo")?
+        .success()
+    {
         bail!("the program to count does not build");
     }
     let found = top.join("target/callgrind.out");
     let run = Command::new("valgrind")
         .args(["--tool=callgrind", &format!("--callgrind-out-file={}", found.display()), "--main-stacksize=67108864"])
-        .arg(top.join("target/release/one_plan"))
+        .arg(top.join(profile.program()))
         .arg(scenario)
         .current_dir(top)
         .output()

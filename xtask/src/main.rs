@@ -15,6 +15,7 @@ use std::process::ExitCode;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 
+use count::Profile;
 use firmware::Table;
 use step::Step;
 
@@ -91,6 +92,9 @@ enum Command {
         /// A published scenario
         #[arg(default_value = "square8-detection")]
         scenario: String,
+        /// Whether the program is compiled to be used, or as it is for tests, where it is there already
+        #[arg(long, value_enum, default_value_t = Profile::Release)]
+        profile: Profile,
     },
 }
 
@@ -116,12 +120,12 @@ fn run(command: &Command) -> anyhow::Result<bool> {
             Step::cargo("the programs", "build --workspace --bins --release"),
             Step::new("the bridge in flight", "target/release/live", "page"),
         ],
-        Command::Count { scenario } => return count::count(scenario, top),
+        Command::Count { scenario, profile } => return count::count(scenario, *profile, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
-        Command::Test => test(),
+        Command::Test => test()?,
         Command::Target => return firmware::target(top),
         Command::Header => return firmware::header(top),
         Command::Instructions => return firmware::instructions(top),
@@ -133,7 +137,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
             };
             return firmware::sizes(table, top);
         }
-        Command::Ci => check().into_iter().chain(test()).collect(),
+        Command::Ci => check().into_iter().chain(test()?).collect(),
         Command::Pictures => pictures(),
         Command::Gallery => vec![Step::cargo("gallery", "run --package quietpath-sim --example gallery")],
     };
@@ -160,15 +164,17 @@ fn check() -> Vec<Step> {
     ]
 }
 
-fn test() -> Vec<Step> {
+fn test() -> anyhow::Result<Vec<Step>> {
+    // This very program: cargo would build it again, for itself alone.
+    let xtask = std::env::current_exe().context("a program knows where it is")?;
     // With the whole workspace, or its crates are built again with other features.
     let others = "test --workspace --test interoperate --test page -- --ignored";
     let mut steps = vec![Step::cargo("tests", "test --workspace")];
     steps.extend(chromium());
     steps.push(Step::cargo("other people's MAVLink, and the report in a browser", others));
-    steps.push(Step::cargo("the firmware under QEMU", "xtask target"));
-    steps.push(Step::cargo("sizes of the firmware", "xtask sizes --compare"));
-    steps
+    steps.push(Step::new("the firmware under QEMU", &xtask, "target"));
+    steps.push(Step::new("sizes of the firmware", &xtask, "sizes --compare"));
+    Ok(steps)
 }
 
 /// Chromium, from the system's packages where it is missing; elsewhere the tests say what they need.

@@ -102,15 +102,16 @@ pub fn rest(number: u64, world: &ScenarioFile, flying: &PlanFile, earliest: f64)
 }
 
 /// The rest of a flight from any time on: for a plan that cannot wait for a node. Its nodes are spread anew over the straight
-/// segments of the flying plan, no closer than they were, and so keep the bound on speed; where they break another
-/// constraint the planner begins from nothing.
+/// segments of the flying plan, and so keep the bound on speed; where they break another constraint the planner begins from
+/// nothing. They are no closer than the scenario's nodes along the whole flight: than those of the flying plan, every plan
+/// would have one less than the one before it.
 #[must_use]
 pub fn rest_at(number: u64, world: &ScenarioFile, flying: &PlanFile, seam: f64) -> Option<Job> {
     let times = flying.node_times();
-    let (begin, last) = (times.first().copied()?, times.last().copied()?);
-    let interval = (last - begin) / times.len().checked_sub(1)? as f64;
+    let last = times.last().copied()?;
+    let interval = (last - world.start_time) / world.intervals as f64;
     // Casts of floats saturate; what is beyond the end has no intervals.
-    let intervals = ((last - seam) / interval) as usize;
+    let intervals = ((last - seam) / interval + EVEN_TOLERANCE) as usize;
     let agent_plan = flying.agents.first()?;
     let curve = Curve::of(flying, &agent_plan.name)?;
     let interval = (last - seam) / intervals as f64;

@@ -73,7 +73,7 @@ class Charts {
         },
       ],
       series: [
-        { label: `time (${unit})`, value: (plot, value) => (value === null ? '\u2013' : value.toFixed(second > 1 ? 2 : 1)) },
+        { label: `time (${unit})`, value: (plot, value) => (Number.isFinite(value) ? value.toFixed(second > 1 ? 2 : 1) : '\u2013') },
         ...panel.lines.map((line) => ({
           label: agents[line.agent].name,
           stroke: () => tint(agents[line.agent].colour),
@@ -118,7 +118,7 @@ class Charts {
 
 /** When a new plan took over from another, s. */
 function takeovers(data) {
-  return data.paths.filter((path) => path.kind === 'step' && path.agent === 0).map((path) => path.times[0]).slice(1);
+  return ways(data).filter((path) => path.kind === 'step' && path.agent === 0).map((path) => path.times[0]).slice(1);
 }
 
 /** A dotted line where a new plan took over. */

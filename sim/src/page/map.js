@@ -1,7 +1,13 @@
 // The map: landscape, regions, sensors, paths and vehicles at one instant, on axes of uPlot.
 
 const INK = '#1a1a1a';
+const FINER = 8; // pixels along a cell of a landscape
 const FAINTEST = 0.02; // jamming below this is not drawn
+
+/** The ways that have a beginning: one that nobody has flown yet has no place. */
+function ways(data) {
+  return data.paths.filter((path) => path.times.length > 0);
+}
 
 /** The place on a way of `times`, `x`, `y` at an instant: at rest before and after. */
 function placeAt(way, time) {
@@ -26,6 +32,7 @@ class Landscape {
     this.colours = colours.map((css) => [1, 3, 5].map((at) => parseInt(css.slice(at, at + 2), 16)));
     this.letters = new Map([...'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/'].map((c, i) => [c, i]));
     this.canvas = document.createElement('canvas');
+    this.smooth = document.createElement('canvas');
     this.drawn = '';
   }
 
@@ -53,7 +60,7 @@ class Landscape {
     const frame = this.frame(time);
     const { columns, rows } = this.fields;
     const key = `${metric} ${frame}`;
-    if (this.drawn === key) return this.canvas;
+    if (this.drawn === key) return this.smooth;
     this.canvas.width = columns;
     this.canvas.height = rows;
     const context = this.canvas.getContext('2d');
@@ -67,8 +74,12 @@ class Landscape {
       pixels.data.set([...rgb, 255], at);
     }
     context.putImageData(pixels, 0, 0);
+    // A printer does not smooth what it draws larger.
+    this.smooth.width = FINER * columns;
+    this.smooth.height = FINER * rows;
+    this.smooth.getContext('2d').drawImage(this.canvas, 0, 0, this.smooth.width, this.smooth.height);
     this.drawn = key;
-    return this.canvas;
+    return this.smooth;
   }
 
   /** The value at shares of the width and height, as words; empty where there is none. */
@@ -232,8 +243,8 @@ class FlightMap {
     const pen = new Pen(plot);
     this.regions(pen);
     const { time } = this.moment;
-    for (const path of this.data.paths.filter((path) => path.kind === 'step')) this.step(pen, path);
-    const main = this.data.paths.filter((path) => path.kind !== 'step');
+    for (const path of ways(this.data).filter((path) => path.kind === 'step')) this.step(pen, path);
+    const main = ways(this.data).filter((path) => path.kind !== 'step');
     for (const path of main) {
       const flown = path.kind === 'flown';
       this.route(pen, path, DASHES[path.agent % DASHES.length], flown ? time : Infinity);
@@ -275,11 +286,9 @@ class FlightMap {
     for (const rim of [[8.6, '#ffffff'], [6.4, colour], [2.6, '#ffffff']]) {
       for (const [a, b] of legs((node) => path.dropout[node] >= 0.5)) pen.line([a, b], rim[1], rim[0]);
     }
-    if (path.x.length) {
-      const end = path.x.length - 1;
-      pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
-      pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
-    }
+    const end = path.x.length - 1;
+    pen.circle(pen.at(path.x[0], path.y[0]), 6, '#ffffff', colour, 3);
+    pen.square(pen.at(path.x[end], path.y[end]), 12, colour, '#ffffff');
   }
 
   regions(pen) {

@@ -48,7 +48,7 @@ function positions(data, time) {
     const { x, y } = placeAt(way, time);
     return [name, { text: x.toFixed(3), kind: 'number' }, { text: y.toFixed(3), kind: 'number' }];
   };
-  const vehicles = data.paths.filter((path) => path.kind !== 'step');
+  const vehicles = ways(data).filter((path) => path.kind !== 'step');
   table('positions', ['what', `east (${data.map.unit})`, `north (${data.map.unit})`], [
     ...vehicles.map((path) => at(data.agents[path.agent].name, path)),
     ...data.map.sensors.map((sensor) => at(sensor.name, sensor)),

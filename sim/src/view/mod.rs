@@ -160,7 +160,8 @@ fn is_ours(address: SocketAddr, headers: &HeaderMap) -> bool {
 async fn index(State(seen): State<watch::Receiver<Arc<Shown>>>) -> Response {
     let shown = seen.borrow().clone();
     if shown.data.is_empty() {
-        let again = "<!doctype html><meta http-equiv=\"refresh\" content=\"1\"><title>quietpath</title><p>The flight is being planned.";
+        let again = "<!doctype html><meta http-equiv=\"refresh\" content=\"1\"><title>quietpath</title>\
+                     <link rel=\"icon\" href=\"data:,\"><p>The flight is being planned.";
         return Html(again).into_response();
     }
     Html(page::live(&shown.title, &shown.data)).into_response()

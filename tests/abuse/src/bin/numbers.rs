@@ -12,17 +12,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use clap::Parser;
 use fastrand::Rng;
-use quietpath_abuse::dice::{Dice, Mood};
-use quietpath_abuse::problem::{Broken, Problem, Verdict, judge};
-use quietpath_core::Real;
-use quietpath_core::solver::Settings;
+use quietpath_abuse::problem::{Broken, KINDS, Verdict, of_kind};
 
 /// Bytes that a problem is drawn from: more than it takes.
 const BYTES: usize = 2048;
 /// Broken promises that are told in full.
 const TOLD_MAX: usize = 10;
-/// Precisions and dimensions, as the table names them.
-const KINDS: [&str; 4] = ["f64, 2-D", "f32, 2-D", "f64, 3-D", "f32, 3-D"];
 
 #[derive(Parser)]
 #[command(about = "Plans random problems in f32 and f64, and judges the plans")]
@@ -50,23 +45,13 @@ struct Tally {
     broken: Vec<String>,
 }
 
-fn one<T: Real, const DIM: usize>(bytes: &[u8]) -> Result<Verdict, Broken> {
-    judge(&Problem::<T, DIM>::draw(&mut Dice::new(bytes, Mood::Sane)), &Settings::default())
-}
-
 /// Plans problem `index` of a sequence; which kind it is, and what came of it.
 fn attempt(seed: u64, index: u64) -> (usize, Result<Verdict, Broken>) {
     // Neighbouring seeds must not give neighbouring sequences.
     let mut random = Rng::with_seed((seed << 32) ^ (index / 4).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     let bytes: Vec<u8> = (0..BYTES).map(|_| random.u8(..)).collect();
     let kind = usize::try_from(index % 4).unwrap_or_default();
-    let verdict = match kind {
-        0 => one::<f64, 2>(&bytes),
-        1 => one::<f32, 2>(&bytes),
-        2 => one::<f64, 3>(&bytes),
-        _ => one::<f32, 3>(&bytes),
-    };
-    (kind, verdict)
+    (kind, of_kind(kind, &bytes))
 }
 
 fn enter(tallies: &mut [Tally], index: u64, (kind, verdict): (usize, Result<Verdict, Broken>)) {

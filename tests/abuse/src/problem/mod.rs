@@ -14,6 +14,24 @@ use quietpath_core::solver::Settings;
 
 use crate::dice::{Dice, Mood};
 
+/// Precisions and dimensions, by [kind](of_kind).
+pub const KINDS: [&str; 4] = ["f64, 2-D", "f32, 2-D", "f64, 3-D", "f32, 3-D"];
+
+/// Plans a problem of some bytes that makes sense with default settings, in one of [`KINDS`], and judges the plan. It is
+/// compiled here, where planning is compiled already.
+///
+/// # Errors
+/// The promise that is broken.
+pub fn of_kind(kind: usize, bytes: &[u8]) -> Result<Verdict, Broken> {
+    let mut dice = Dice::new(bytes, Mood::Sane);
+    match kind {
+        0 => judge(&Problem::<f64, 2>::draw(&mut dice), &Settings::default()),
+        1 => judge(&Problem::<f32, 2>::draw(&mut dice), &Settings::default()),
+        2 => judge(&Problem::<f64, 3>::draw(&mut dice), &Settings::default()),
+        _ => judge(&Problem::<f32, 3>::draw(&mut dice), &Settings::default()),
+    }
+}
+
 /// Plans a problem of some bytes, in either precision and both dimensions, and judges the plan.
 ///
 /// # Panics
