@@ -1,5 +1,5 @@
 //! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
-//! `gallery`, `bench`, `live`, `count`, `fuzz`, `numbers`, `deny`.
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `sanitize`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -76,6 +76,15 @@ enum Command {
         #[arg(long)]
         only: Option<String>,
     },
+    /// Flights on which something goes wrong, over many seeds; writes docs/hardening/faults.md
+    Faults {
+        /// Seeds of each fault that one process is enough for
+        #[arg(default_value_t = 1000)]
+        seeds: u64,
+        /// Seeds of each fault of the programs; each takes some ten seconds
+        #[arg(long, default_value_t = 20)]
+        programs: u64,
+    },
     /// Plans random problems in f32 and f64 and judges the plans; writes docs/hardening/numbers.md
     Numbers {
         /// Problems
@@ -119,6 +128,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Count { scenario } => return count::count(scenario, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
+        Command::Faults { seeds, programs } => faults(*seeds, *programs),
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test(),
@@ -185,6 +195,16 @@ fn chromium() -> Vec<Step> {
 fn bench(arguments: &[String]) -> Step {
     let program = "run --release --package quietpath-tests --bin bench --";
     Step::cargo("measurements", [&[program.to_owned()], arguments].concat().join(" ").trim_end())
+}
+
+fn faults(seeds: u64, programs: u64) -> Vec<Step> {
+    let program = "run --release --package quietpath-tests --bin faults --";
+    let choices = format!("{seeds} --programs {programs} --threads 4 --out docs/hardening/faults.md");
+    vec![
+        // The campaign starts them.
+        Step::cargo("the programs", "build --workspace --bins --release"),
+        Step::cargo("faults", &format!("{program} {choices}")),
+    ]
 }
 
 fn numbers(count: u64) -> Step {

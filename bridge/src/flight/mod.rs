@@ -49,7 +49,7 @@ use crate::replan::job::Budgets;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
-use crate::telemetry::{INTERVALS, Mode, Telemetry, Vehicle, mode_command};
+use crate::telemetry::{INTERVALS, LINK_TIMEOUT, Mode, Telemetry, Vehicle, mode_command};
 
 pub use resume::Journal;
 pub use settings::{FlyMode, OnFailure, Settings};
@@ -60,6 +60,8 @@ const HEARTBEAT: Duration = Duration::from_secs(1);
 const MODE_AGAIN: Duration = Duration::from_secs(1);
 /// How old a position may be before it is asked for again.
 const FIX_MAX: Duration = Duration::from_secs(2);
+/// Time between two heartbeats of another program that show that it lives.
+const OTHER_LIVES: Duration = Duration::from_millis(500);
 /// Longest that leaving takes.
 const LEAVE_MAX: Duration = Duration::from_secs(3);
 
@@ -203,6 +205,10 @@ pub struct Flight {
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
     intervals_asked: Time,
+    /// When the vehicle was met, and another program that speaks as this one.
+    met: Time,
+    other: Option<Time>,
+    is_crowded: bool,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -279,6 +285,9 @@ impl Flight {
             setpoint: None,
             mode_asked: None,
             intervals_asked: Time::ZERO,
+            met: Time::ZERO,
+            other: None,
+            is_crowded: false,
             link_lost: false,
             out: Vec::new(),
         })
@@ -307,10 +316,16 @@ impl Flight {
 
     /// Something happened, or time passed.
     pub fn step(&mut self, now: Time, input: Input) -> Vec<Output> {
+        let asleep = now.since(self.now);
         // Time does not go backwards, whatever a caller says.
         self.now = self.now.max(now);
         if matches!(self.phase, Phase::Ended) {
             return Vec::new();
+        }
+        if asleep > LINK_TIMEOUT && matches!(self.phase, Phase::Fly) && self.settings.mode == FlyMode::Guided {
+            // As where the vehicle was not heard: the plan has gone on without it.
+            let seconds = asleep.as_secs_f64();
+            self.give_up(format!("the bridge's computer stood still for {seconds:.1} s while it steered"));
         }
         match input {
             Input::Tick | Input::LinkUp => {}
@@ -367,10 +382,14 @@ impl Flight {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
         if !was_known {
             self.us.system = vehicle.identity.system;
+            self.met = self.now;
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);
             self.ask_for_intervals(vehicle.identity);
+        }
+        if frame.from == self.us && matches!(frame.message, MavMessage::HEARTBEAT(_)) {
+            return self.meet_another();
         }
         let mut out = Vec::new();
         if let MavMessage::TIMESYNC(data) = &frame.message
