@@ -7,8 +7,8 @@ use quietpath_bridge::file::ScenarioFile;
 use quietpath_bridge::flight::settings::{FlyMode, MissionOutput, PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Settings};
 use quietpath_bridge::frame::LocalFrame;
-use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::link::dialect::*;
+use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::mission::{Item, List};
 use quietpath_bridge::record::{Beginning, Recorder, replay};
 use quietpath_bridge::replan::{Answer, Observation};
@@ -147,6 +147,17 @@ fn silence_is_at_hand_for_a_panic() {
         })
         .collect();
     assert_eq!(levels, [0.0]);
+}
+
+#[test]
+fn a_vehicle_that_does_not_get_on_does_not_jam_for_ever() {
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Mission));
+    world.begin(FlyMode::Mission);
+    world.current = Some(2 + 10);
+    world.pass(41.0);
+    assert_eq!(world.level, Some(0.5), "20 s at full power are 40 s at half of it");
+    world.pass(2.0);
+    assert_eq!((world.flight.phase(), world.level), ("fly", Some(0.0)));
 }
 
 #[test]

@@ -7,6 +7,7 @@
 mod count;
 mod firmware;
 mod fuzz;
+mod sanitize;
 mod step;
 
 use std::path::Path;
@@ -91,6 +92,8 @@ enum Command {
         #[arg(default_value_t = 10_000)]
         count: u64,
     },
+    /// Tests under Miri and with sanitizers. Needs a nightly toolchain with miri and rust-src
+    Sanitize,
     /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
@@ -129,6 +132,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
+        Command::Sanitize => sanitize::steps(),
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test(),
@@ -198,12 +202,11 @@ fn bench(arguments: &[String]) -> Step {
 }
 
 fn faults(seeds: u64, programs: u64) -> Vec<Step> {
-    let program = "run --release --package quietpath-tests --bin faults --";
     let choices = format!("{seeds} --programs {programs} --threads 4 --out docs/hardening/faults.md");
     vec![
-        // The campaign starts them.
-        Step::cargo("the programs", "build --workspace --bins --release"),
-        Step::cargo("faults", &format!("{program} {choices}")),
+        // As tests build them, with all checks on, and as the campaign itself does for the programs that it starts.
+        Step::cargo("the programs", "test --no-run --quiet --workspace --test interoperate --test cli"),
+        Step::new("faults", "target/debug/faults", &choices),
     ]
 }
 

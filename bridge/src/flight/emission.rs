@@ -11,6 +11,9 @@ use crate::telemetry::Mode;
 /// How much longer than its deadline planning may take before the planner counts as stalled, s.
 const STALL_GRACE: f64 = 1.0;
 
+/// Share of the jamming budget that is sent at most: switching takes its time, and plans end on theirs.
+const BUDGET_SHARE_MAX: f64 = 1.05;
+
 impl Flight {
     /// What payloads are to emit now; `None`, which means level 0 and full power, unless *all* of this holds: the plan is
     /// being flown, the vehicle is heard, armed, in the air and in the mode of the plan, the planner is not stalled, and
@@ -39,8 +42,23 @@ impl Flight {
                 .map_or(0.0, |values| step_value(&times, values, time))
         };
         // A bridge that died does not jam again: see `resume`.
-        let level = if self.is_resumed { 0.0 } else { control(&plan.jam) };
+        let level = if self.is_resumed || self.is_spent() { 0.0 } else { control(&plan.jam) };
         Some(Emission { level, azimuth: control(&plan.azimuth), dropout: control(&plan.dropout) })
+    }
+
+    /// Whether all of the jamming budget has been sent. Plans keep their budgets by their own time: a vehicle that takes
+    /// longer to its next waypoint, or never gets there, jams on meanwhile.
+    fn is_spent(&self) -> bool {
+        self.budget.is_some_and(|budget| self.jammed > BUDGET_SHARE_MAX * budget)
+    }
+
+    /// Counts what is sent from now on: so much, up to the next time.
+    pub(super) fn count_emission(&mut self, emission: Option<Emission>) {
+        let (since, level) = self
+            .emitted
+            .replace((self.now, emission.map_or(0.0, |emission| emission.level)))
+            .unwrap_or((self.now, 0.0));
+        self.jammed += level * self.now.since(since).as_secs_f64();
     }
 
     /// The mode in which the vehicle flies the plan.

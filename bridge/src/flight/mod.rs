@@ -209,6 +209,10 @@ pub struct Flight {
     met: Time,
     other: Option<Time>,
     is_crowded: bool,
+    /// The jamming budget, what was sent of it, s, and what is being sent, since when.
+    budget: Option<f64>,
+    jammed: f64,
+    emitted: Option<(Time, f64)>,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -244,6 +248,7 @@ impl Flight {
         let curve = Curve::of(plan, &agent)
             .ok_or_else(|| fail("has a plan with numbers that are not finite".into(), "plan it again"))?;
         let radiation = settings.radiation(entry.jammer_live);
+        let budget = entry.jammer.map(|jammer| jammer.budget);
         let relay = Relay::new(settings.payloads(), radiation);
         let telemetry = Telemetry::new(settings.autopilot.choice(), settings.system);
         let made = scenario.start_time;
@@ -288,6 +293,9 @@ impl Flight {
             met: Time::ZERO,
             other: None,
             is_crowded: false,
+            budget,
+            jammed: 0.0,
+            emitted: None,
             link_lost: false,
             out: Vec::new(),
         })
@@ -518,6 +526,7 @@ impl Flight {
         }
         let mut out = Vec::new();
         let emission = self.emission();
+        self.count_emission(emission);
         self.relay.poll(self.now, vehicle.identity, emission, &mut out);
         self.send(out);
     }

@@ -114,7 +114,8 @@ impl Machine {
         for trouble in due {
             match trouble {
                 Trouble::Restart { .. } => self.restart(),
-                Trouble::Silence { .. } | Trouble::Leap { .. } | Trouble::Nonsense { .. } | Trouble::Crowd { .. } => {}
+                Trouble::Silence { .. } | Trouble::Leap { .. } | Trouble::Nonsense { .. } | Trouble::Crowd { .. } => {
+                }
                 Trouble::Station { items, .. } => {
                     let talk = Talk { us: STATION, vehicle: self.us, list: List::Mission };
                     self.stations.push(Station(Upload::new(talk, items, Pace::default())));
@@ -187,8 +188,7 @@ impl Machine {
             let mut inputs: Vec<Input> = self.out.iter().map(|sent| overheard(sent.from, &sent.message)).collect();
             inputs.extend(self.passed_on.drain(..).map(|(from, message)| overheard(from, &message)));
             inputs.push(Input::Tick);
-            let outputs: Vec<Output> =
-                inputs.into_iter().flat_map(|input| flight.step(self.now, input)).collect();
+            let outputs: Vec<Output> = inputs.into_iter().flat_map(|input| flight.step(self.now, input)).collect();
             for output in outputs {
                 match output {
                     Output::Send(message) => {

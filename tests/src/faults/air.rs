@@ -210,7 +210,8 @@ impl Watched {
         let rival = machine.rivals().find(|(phase, _)| matches!(*phase, "fly" | "approach"));
         let rival = rival.map(|(phase, _)| phase);
         // On the way to the start it may fly as fast as it can.
-        if self.flight.began().is_some_and(|began| now > began.seconds() + 2.0) && now == self.flown && self.is_clean {
+        if self.flight.began().is_some_and(|began| now > began.seconds() + 2.0) && now == self.flown && self.is_clean
+        {
             self.speed = self.speed.max(east.hypot(north));
         }
         if let Some(phase) = rival {
@@ -252,8 +253,8 @@ pub fn fly(trial: &Trial, mode: FlyMode, seed: u64) -> Flown {
     let mut random = Rng::with_seed(seed ^ 0x5eed_0000);
     let mut setup = setup(mode, seed);
     (trial.prepare)(&mut setup, &mut random);
-    // A plan takes 23 s or more, and the way to its start some 10.
-    let at = if trial.when == When::Flying { 1.0 + 17.0 * random.f64() } else { 0.5 + 4.0 * random.f64() };
+    // A plan takes 23 s or more, and nobody takes off in the first 3.
+    let at = if trial.when == When::Flying { 1.0 + 17.0 * random.f64() } else { 0.5 + 1.3 * random.f64() };
     let (scenario, plan, settings) = (setup.scenario.clone(), setup.plan.clone(), setup.flight.clone());
     let mut around = Around { random, scenario, plan, settings };
     let is_clean = setup.faults == Faults::NONE;
@@ -271,7 +272,8 @@ pub fn fly(trial: &Trial, mode: FlyMode, seed: u64) -> Flown {
             When::Flying => watched.flight.began().map(|began| now - began.seconds()),
             When::Before => Some(now),
         };
-        let is_due = since.is_some_and(|since| since >= at && (watched.struck.is_none() || since < at + trial.span_s));
+        let is_due =
+            since.is_some_and(|since| since >= at && (watched.struck.is_none() || since < at + trial.span_s));
         if is_due {
             watched.struck.get_or_insert(now);
             (trial.strike)(&mut watched.flight, &mut around);

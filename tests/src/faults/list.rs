@@ -79,12 +79,7 @@ fn wires(setup: &mut Setup, faults: Faults) {
     setup.faults = faults;
 }
 
-fn air(
-    name: &'static str,
-    says: &'static str,
-    [steered, mission]: [Option<Outcome>; 2],
-    trial: Trial,
-) -> Fault {
+fn air(name: &'static str, says: &'static str, [steered, mission]: [Option<Outcome>; 2], trial: Trial) -> Fault {
     Fault { name, says, steered, mission, fly: Fly::Air(trial) }
 }
 
@@ -214,10 +209,7 @@ fn of_the_bridge() -> Vec<Fault> {
             "sleep",
             "the bridge's clock leaps ahead by 4 to 20 s",
             [Some(Holds), Some(Arrives)],
-            Trial {
-                strike: |flight, around| flight.leap(seconds(&mut around.random, 4.0, 20.0)),
-                ..Trial::NONE
-            },
+            Trial { strike: |flight, around| flight.leap(seconds(&mut around.random, 4.0, 20.0)), ..Trial::NONE },
         ),
         air(
             "slow-plan",
@@ -286,7 +278,8 @@ fn by_others() -> Vec<Fault> {
             "station",
             "another ground station replaces the mission",
             [Some(Arrives), Some(LetsGo)],
-            Trial { strike: station, ..Trial::NONE },
+            // Without plans of our own on their way: of two uploads at once the autopilot takes one.
+            Trial { prepare: |setup, _| setup.flight.replan = None, strike: station, ..Trial::NONE },
         ),
         air(
             "second-planner",

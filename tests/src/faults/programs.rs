@@ -60,12 +60,7 @@ pub enum Trial {
     Second,
 }
 
-fn fault(
-    name: &'static str,
-    says: &'static str,
-    [steered, mission]: [Option<Outcome>; 2],
-    trial: Trial,
-) -> Fault {
+fn fault(name: &'static str, says: &'static str, [steered, mission]: [Option<Outcome>; 2], trial: Trial) -> Fault {
     Fault { name, says, steered, mission, fly: Fly::Programs(trial) }
 }
 
@@ -81,7 +76,12 @@ pub fn faults() -> Vec<Fault> {
         fault("suspended", "the bridge's computer sleeps for 12 s", [Some(Holds), Some(Arrives)], Trial::Suspended),
         fault("terminated", "the bridge is ended (SIGTERM) in flight", [Some(Holds), None], Trial::Terminated),
         fault("disk-full", "the disk is full while the flight is recorded", both(Arrives), Trial::DiskFull),
-        fault("no-record", "the disk is full before the flight, which is to be recorded", both(Refuses), Trial::NoRecord),
+        fault(
+            "no-record",
+            "the disk is full before the flight, which is to be recorded",
+            both(Refuses),
+            Trial::NoRecord,
+        ),
         fault("no-log", "the disk that the log is written to is full", both(Arrives), Trial::NoLog),
         fault("datagrams", "10 000 datagrams a second at the port for observations", both(Arrives), Trial::Flood),
         fault("rebooted", "the autopilot is switched off in flight, and on again", both(LetsGo), Trial::Rebooted),
@@ -139,7 +139,12 @@ impl Programs {
         let mode = if self.mode == FlyMode::Guided { "guided" } else { "mission" };
         let path = |name| self.folder.path(name);
         let mut command = Command::new("sh");
-        command.args(["-c", shell, "sh"]).arg(built("quietpath-bridge")).args(["run", "--arm-jammer", "--mode", mode]);
+        command.args(["-c", shell, "sh"]).arg(built("quietpath-bridge")).args([
+            "run",
+            "--arm-jammer",
+            "--mode",
+            mode,
+        ]);
         command.args(["--scenario", &path("scenario.toml"), "--plan", &path("plan.json")]);
         command.args(["--config", &path("bridge.toml"), "--state", &path("flight.state")]);
         command.args(["--record", &path("flight.jsonl"), "--speedup", &SPEEDUP.to_string()]);
