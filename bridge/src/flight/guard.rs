@@ -3,6 +3,7 @@
 //! A sign that somebody else sent one is looked into by reading the mission back; only a mission that differs ends the
 //! flight.
 
+use crate::clock::Time;
 use crate::link::Frame;
 use crate::link::dialect::MavMessage;
 use crate::mission::item::first_difference;
@@ -11,6 +12,17 @@ use crate::telemetry::{Mode, Vehicle};
 
 use super::settings::FlyMode;
 use super::{End, Flight, Level, OTHER_LIVES, Phase};
+
+/// Others on this vehicle: programs that speak as this one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Company {
+    /// When the vehicle was met.
+    pub(super) met: Time,
+    /// When another one was heard first.
+    heard: Option<Time>,
+    /// Whether people were told.
+    is_told: bool,
+}
 
 impl Flight {
     /// From now on this mission is ours.
@@ -61,7 +73,7 @@ impl Flight {
     /// Another program on this vehicle says that it is this component. One that flies goes on; one that does not yet
     /// does not begin. Twice: the last word of a bridge that has died may come late.
     pub(super) fn meet_another(&mut self) {
-        let Some(first) = self.other else { return self.other = Some(self.now) };
+        let Some(first) = self.company.heard else { return self.company.heard = Some(self.now) };
         if self.now.since(first) < OTHER_LIVES {
             return;
         }
@@ -71,8 +83,8 @@ impl Flight {
                 self.end(End::Failed(format!("{who}: end it first")));
             }
             Phase::Approach { .. } => self.leave(Mode::Hold, End::Failed(format!("{who}: end it first"))),
-            Phase::Fly if !self.is_crowded => {
-                self.is_crowded = true;
+            Phase::Fly if !self.company.is_told => {
+                self.company.is_told = true;
                 self.say(Level::Warn, who);
             }
             Phase::Fly | Phase::Leave { .. } | Phase::Ended => {}

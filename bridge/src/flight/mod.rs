@@ -51,6 +51,8 @@ use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
 use crate::telemetry::{INTERVALS, LINK_TIMEOUT, Mode, Telemetry, Vehicle, mode_command};
 
+use emission::Spending;
+use guard::Company;
 pub use resume::Journal;
 pub use settings::{FlyMode, OnFailure, Settings};
 
@@ -205,14 +207,8 @@ pub struct Flight {
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
     intervals_asked: Time,
-    /// When the vehicle was met, and another program that speaks as this one.
-    met: Time,
-    other: Option<Time>,
-    is_crowded: bool,
-    /// The jamming budget, what was sent of it, s, and what is being sent, since when.
-    budget: Option<f64>,
-    jammed: f64,
-    emitted: Option<(Time, f64)>,
+    company: Company,
+    spending: Spending,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -248,7 +244,6 @@ impl Flight {
         let curve = Curve::of(plan, &agent)
             .ok_or_else(|| fail("has a plan with numbers that are not finite".into(), "plan it again"))?;
         let radiation = settings.radiation(entry.jammer_live);
-        let budget = entry.jammer.map(|jammer| jammer.budget);
         let relay = Relay::new(settings.payloads(), radiation);
         let telemetry = Telemetry::new(settings.autopilot.choice(), settings.system);
         let made = scenario.start_time;
@@ -290,12 +285,8 @@ impl Flight {
             setpoint: None,
             mode_asked: None,
             intervals_asked: Time::ZERO,
-            met: Time::ZERO,
-            other: None,
-            is_crowded: false,
-            budget,
-            jammed: 0.0,
-            emitted: None,
+            company: Company::default(),
+            spending: Spending::new(entry.jammer.map(|jammer| jammer.budget)),
             link_lost: false,
             out: Vec::new(),
         })
@@ -390,7 +381,7 @@ impl Flight {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
         if !was_known {
             self.us.system = vehicle.identity.system;
-            self.met = self.now;
+            self.company.met = self.now;
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);

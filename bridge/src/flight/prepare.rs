@@ -155,7 +155,7 @@ impl Flight {
             return;
         }
         match self.settings.mode {
-            FlyMode::Guided if self.now.since(self.met) < LISTEN => {}
+            FlyMode::Guided if self.now.since(self.company.met) < LISTEN => {}
             FlyMode::Guided => {
                 self.say(Level::Info, "in the air: flying to the start");
                 self.phase = Phase::Approach { since: self.now };

@@ -158,7 +158,12 @@ fn of_the_vehicle() -> Vec<Fault> {
             "autopilot-restart",
             "the autopilot begins anew in flight",
             both(Arrives),
-            Trial { strike: |flight, _| flight.machine_mut().restart(), ..Trial::NONE },
+            // One that could be faster than its plans hurries after them.
+            Trial {
+                prepare: |setup, _| setup.autopilot.limits.speed_max *= 0.525,
+                strike: |flight, _| flight.machine_mut().restart(),
+                ..Trial::NONE
+            },
         ),
         air(
             "leap",
