@@ -188,6 +188,9 @@ impl Recorder {
 
     /// Writes an input and what came out of it.
     pub fn write(&mut self, now: Time, input: &Input, outputs: &[Output]) {
+        if self.has_failed {
+            return;
+        }
         let output = (!outputs.is_empty()).then(|| outputs.iter().map(written).collect());
         let result = self.try_write(&Line { t: now, input: Some(Written::of(input)), output });
         if let Input::Frame(frame) = input {
@@ -206,12 +209,15 @@ impl Recorder {
 
     /// Writes a frame, of either direction, to the `.tlog`.
     pub fn frame(&mut self, now: Time, bytes: &[u8]) {
+        if self.has_failed {
+            return;
+        }
         let time = self.epoch.saturating_add(now.micros()).to_be_bytes();
         let result = self.tlog.write_all(&time).and_then(|()| self.tlog.write_all(bytes));
         self.note(result);
     }
 
-    /// A full disk ends the record, and not the flight.
+    /// A full disk ends the record, and not the flight. Nothing follows a line that was not written.
     fn note(&mut self, result: io::Result<()>) {
         if let Err(error) = result
             && !self.has_failed

@@ -136,6 +136,8 @@ pub struct Rehearsal {
     down: Wire,
     hop: Hop,
     now: Time,
+    /// How far the bridge's clock is ahead.
+    ahead: Duration,
     tick: Duration,
     planning: Duration,
     answers: VecDeque<(Time, Answer)>,
@@ -168,6 +170,7 @@ impl Rehearsal {
             down: Wire::new(faults, seed.wrapping_add(1)),
             hop,
             now: Time::ZERO,
+            ahead: Duration::ZERO,
             tick,
             planning,
             answers: VecDeque::new(),
@@ -194,9 +197,10 @@ impl Rehearsal {
         self.now = self.now + self.tick;
         while let Some(bytes) = self.down.receive(self.now) {
             let bytes = self.hop.down(bytes)?;
-            for frame in self.ours.decode(self.now, Source::Line, &bytes) {
+            let now = self.bridge_now();
+            for frame in self.ours.decode(now, Source::Line, &bytes) {
                 if let Some(recorder) = &mut self.recorder {
-                    recorder.frame(self.now, &frame.bytes);
+                    recorder.frame(now, &frame.bytes);
                 }
                 self.wire.hear(self.now, Direction::Down, &frame.message);
                 self.feed(Input::Frame(Box::new(frame)));
@@ -217,7 +221,8 @@ impl Rehearsal {
             }
         }
         for sent in self.machine.tick(self.now) {
-            let bytes = self.theirs.encode_as(self.now, sent.from.component, &sent.message);
+            let us = self.machine.identity();
+            let bytes = sent.bytes(us, |component, message| self.theirs.encode_as(self.now, component, message));
             self.down.send(self.now, &bytes);
         }
         Ok(std::mem::take(&mut self.events))
@@ -233,18 +238,33 @@ impl Rehearsal {
         self.feed(Input::Stop(why.to_owned()));
     }
 
+    /// The bridge's clock leaps ahead, as where its computer slept.
+    pub fn leap(&mut self, span: Duration) {
+        self.ahead += span;
+    }
+
+    /// From now on planning takes so long.
+    pub const fn plan_in(&mut self, planning: Duration) {
+        self.planning = planning;
+    }
+
+    fn bridge_now(&self) -> Time {
+        self.now + self.ahead
+    }
+
     fn feed(&mut self, input: Input) {
-        let outputs = self.flight.step(self.now, input.clone());
+        let now = self.bridge_now();
+        let outputs = self.flight.step(now, input.clone());
         if let Some(recorder) = &mut self.recorder {
-            recorder.write(self.now, &input, &outputs);
+            recorder.write(now, &input, &outputs);
         }
         for output in outputs {
             match output {
                 Output::Send(message) => {
                     self.wire.hear(self.now, Direction::Up, &message);
-                    let bytes = self.ours.encode(self.now, &message);
+                    let bytes = self.ours.encode(now, &message);
                     if let Some(recorder) = &mut self.recorder {
-                        recorder.frame(self.now, &codec::plain_bytes(self.ours.identity(), &message));
+                        recorder.frame(now, &codec::plain_bytes(self.ours.identity(), &message));
                     }
                     self.up.send(self.now, &bytes);
                 }

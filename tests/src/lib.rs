@@ -1,6 +1,7 @@
 //! What the whole-system tests share: where things are, and the recorded figures.
 
 pub mod bench;
+pub mod faults;
 pub mod figures;
 pub mod instances;
 pub mod live;

@@ -7,8 +7,8 @@ use quietpath_bridge::file::ScenarioFile;
 use quietpath_bridge::flight::settings::{FlyMode, MissionOutput, PayloadEntry, PayloadKind, Replanning};
 use quietpath_bridge::flight::{End, Flight, Input, OnFailure, Settings};
 use quietpath_bridge::frame::LocalFrame;
-use quietpath_bridge::link::Identity;
 use quietpath_bridge::link::dialect::*;
+use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::mission::{Item, List};
 use quietpath_bridge::record::{Beginning, Recorder, replay};
 use quietpath_bridge::replan::{Answer, Observation};
@@ -147,6 +147,17 @@ fn silence_is_at_hand_for_a_panic() {
         })
         .collect();
     assert_eq!(levels, [0.0]);
+}
+
+#[test]
+fn a_vehicle_that_does_not_get_on_does_not_jam_for_ever() {
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Mission));
+    world.begin(FlyMode::Mission);
+    world.current = Some(2 + 10);
+    world.pass(41.0);
+    assert_eq!(world.level, Some(0.5), "20 s at full power are 40 s at half of it");
+    world.pass(2.0);
+    assert_eq!((world.flight.phase(), world.level), ("fly", Some(0.0)));
 }
 
 #[test]
@@ -442,6 +453,55 @@ fn a_vehicle_that_was_not_heard_does_not_chase_the_plan() {
     assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("not heard")), "{:?}", world.end);
     let along = world.setpoints[before..].iter().filter(|(_, data)| data.type_mask.bits() == 3072);
     assert_eq!(along.count(), 0);
+}
+
+/// The first thing that a bridge finds when its computer goes on is what the vehicle has said meanwhile.
+#[test]
+fn a_bridge_that_slept_does_not_chase_the_plan() {
+    for seconds in [4, 3600] {
+        let mut world = World::new(Autopilot::ArduPilot, settings(FlyMode::Guided));
+        world.begin(FlyMode::Guided);
+        world.pass(5.0);
+        let before = world.setpoints.len();
+        world.now += seconds * 1000;
+        world.pass(2.0);
+        assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("stood still")), "{:?}", world.end);
+        let along = world.setpoints[before..].iter().filter(|(_, data)| data.type_mask.bits() == 3072);
+        assert_eq!((along.count(), world.level), (0, Some(0.0)));
+    }
+}
+
+#[test]
+fn two_programs_never_fly_one_vehicle() {
+    let heartbeat = quietpath_bridge::link::codec::companion_heartbeat();
+    let say = |world: &mut World| {
+        let frame = Frame { from: Identity::COMPANION, sequence: 0, message: heartbeat.clone(), bytes: Vec::new() };
+        world.input(Input::Frame(Box::new(frame)));
+    };
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.pass(3.0);
+    say(&mut world);
+    world.pass(0.3);
+    say(&mut world);
+    assert_eq!(world.end, None, "the last words of a bridge that has died");
+    world.pass(0.3);
+    say(&mut world);
+    assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("another program")), "{:?}", world.end);
+    // One that flies goes on.
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.begin(FlyMode::Guided);
+    for _ in 0..5 {
+        say(&mut world);
+        world.pass(1.0);
+    }
+    assert_eq!((world.flight.phase(), &world.end), ("fly", &None));
+    assert_eq!(world.said.iter().filter(|text| text.contains("another program")).count(), 1);
+    // One that is steered already is left alone.
+    let mut world = World::new(Autopilot::Px4, settings(FlyMode::Guided));
+    world.armed = true;
+    world.mode(Mode::Guided);
+    world.pass(1.0);
+    assert!(matches!(&world.end, Some(End::Failed(why)) if why.contains("steers")), "{:?}", world.end);
 }
 
 #[test]

@@ -234,6 +234,43 @@ fn a_signed_link_works_and_an_unsigned_one_says_why_not() {
     assert!(err.contains("frames were refused for their signature: do both ends have the key?"), "{err}");
 }
 
+/// A flight on a signed link, with everything written that can be: the key is nowhere but in its file.
+#[test]
+fn a_key_gets_into_no_log_and_no_record() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = Folder::new();
+    let digits: String = (0..32).map(|byte| format!("{:02x}", 7 * byte + 3)).collect();
+    for name in ["ours.key", "theirs.key"] {
+        folder.write(name, &digits);
+        std::fs::set_permissions(folder.path(name), std::fs::Permissions::from_mode(0o600)).expect("permissions");
+    }
+    let port = free_port();
+    let vehicle = Vehicle::start(port, Some(Path::new(&folder.path("theirs.key"))));
+    let path = |name: &str| folder.path(name);
+    let (link, scenario, plan) = (format!("udpin:127.0.0.1:{port}"), path("scenario.toml"), path("plan.json"));
+    let (key, record, state, config) =
+        (path("ours.key"), path("flight.jsonl"), path("flight.state"), path("bridge.toml"));
+    let arguments = ["run", "--link", &link, "--signing-key", &key, "--scenario", &scenario, "--plan", &plan];
+    let more = ["--mode", "guided", "--record", &record, "--state", &state, "--config", &config];
+    let mut command = bridge(&[&arguments[..], &more].concat());
+    let child = command.env("QUIETPATH_LOG", "trace").spawn().expect("the program runs");
+    vehicle.wait("the plan is flown", |seen| seen.setpoints > 20 && Path::new(&state).exists());
+    let kept = std::fs::read(&state).expect("what the next bridge needs");
+    let (_, out, err) = terminate(child);
+    let bytes: Vec<u8> = (0..32).map(|byte| 7 * byte + 3).collect();
+    let read = |path: String| std::fs::read(path).expect("written");
+    let written = [read(record), read(path("flight.tlog")), kept, out.into_bytes(), err.into_bytes()];
+    assert!(written[..3].iter().all(|text| text.len() > 100), "all of it is there");
+    // Parts of it tell too much already.
+    let capitals = digits.to_uppercase();
+    let secrets = [&digits.as_bytes()[..16], &capitals.as_bytes()[..16], &bytes[..8]];
+    let holds = |text: &[u8], secret: &[u8]| text.windows(secret.len()).any(|part| part == secret);
+    for (which, text) in written.iter().enumerate() {
+        assert!(!secrets.iter().any(|secret| holds(text, secret)), "output {which} holds the key");
+    }
+    assert!(holds(&read(key), secrets[0]), "this would find it");
+}
+
 #[test]
 fn bad_input_is_answered_with_what_would_be_right() {
     let folder = Folder::new();

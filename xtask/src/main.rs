@@ -1,5 +1,5 @@
 //! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
-//! `gallery`, `bench`, `live`, `count`, `fuzz`, `numbers`, `deny`.
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `sanitize`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -7,6 +7,7 @@
 mod count;
 mod firmware;
 mod fuzz;
+mod sanitize;
 mod step;
 
 use std::path::Path;
@@ -77,12 +78,23 @@ enum Command {
         #[arg(long)]
         only: Option<String>,
     },
+    /// Flights on which something goes wrong, over many seeds; writes docs/hardening/faults.md
+    Faults {
+        /// Seeds of each fault that one process is enough for
+        #[arg(default_value_t = 1000)]
+        seeds: u64,
+        /// Seeds of each fault of the programs; each takes some ten seconds
+        #[arg(long, default_value_t = 20)]
+        programs: u64,
+    },
     /// Plans random problems in f32 and f64 and judges the plans; writes docs/hardening/numbers.md
     Numbers {
         /// Problems
         #[arg(default_value_t = 10_000)]
         count: u64,
     },
+    /// Tests under Miri and with sanitizers. Needs a nightly toolchain with miri and rust-src
+    Sanitize,
     /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
@@ -123,6 +135,8 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Count { scenario, profile } => return count::count(scenario, *profile, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
+        Command::Faults { seeds, programs } => faults(*seeds, *programs),
+        Command::Sanitize => sanitize::steps(),
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test()?,
@@ -191,6 +205,15 @@ fn chromium() -> Vec<Step> {
 fn bench(arguments: &[String]) -> Step {
     let program = "run --release --package quietpath-tests --bin bench --";
     Step::cargo("measurements", [&[program.to_owned()], arguments].concat().join(" ").trim_end())
+}
+
+fn faults(seeds: u64, programs: u64) -> Vec<Step> {
+    let choices = format!("{seeds} --programs {programs} --threads 4 --out docs/hardening/faults.md");
+    vec![
+        // As tests build them, with all checks on, and as the campaign itself does for the programs that it starts.
+        Step::cargo("the programs", "test --no-run --quiet --workspace --test interoperate --test cli"),
+        Step::new("faults", "target/debug/faults", &choices),
+    ]
 }
 
 fn numbers(count: u64) -> Step {

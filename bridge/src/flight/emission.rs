@@ -1,5 +1,6 @@
 //! What payloads emit.
 
+use crate::clock::Time;
 use crate::payload::Emission;
 use crate::replan::job::step_value;
 use crate::telemetry::Flying as InAir;
@@ -10,6 +11,27 @@ use crate::telemetry::Mode;
 
 /// How much longer than its deadline planning may take before the planner counts as stalled, s.
 const STALL_GRACE: f64 = 1.0;
+
+/// Share of the jamming budget that is sent at most: switching takes its time, and plans end on theirs.
+const BUDGET_SHARE_MAX: f64 = 1.05;
+
+/// What was jammed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Spending {
+    /// The budget, s at full power; `None` without a jammer.
+    budget: Option<f64>,
+    /// What was sent of it, s.
+    sent: f64,
+    /// The level that is being sent, and since when.
+    now: Option<(Time, f64)>,
+}
+
+impl Spending {
+    /// Nothing was sent yet.
+    pub(super) const fn new(budget: Option<f64>) -> Self {
+        Self { budget, sent: 0.0, now: None }
+    }
+}
 
 impl Flight {
     /// What payloads are to emit now; `None`, which means level 0 and full power, unless *all* of this holds: the plan is
@@ -39,8 +61,22 @@ impl Flight {
                 .map_or(0.0, |values| step_value(&times, values, time))
         };
         // A bridge that died does not jam again: see `resume`.
-        let level = if self.is_resumed { 0.0 } else { control(&plan.jam) };
+        let level = if self.is_resumed || self.is_spent() { 0.0 } else { control(&plan.jam) };
         Some(Emission { level, azimuth: control(&plan.azimuth), dropout: control(&plan.dropout) })
+    }
+
+    /// Whether all of the jamming budget has been sent. Plans keep their budgets by their own time: a vehicle that takes
+    /// longer to its next waypoint, or never gets there, jams on meanwhile.
+    fn is_spent(&self) -> bool {
+        self.spending.budget.is_some_and(|budget| self.spending.sent > BUDGET_SHARE_MAX * budget)
+    }
+
+    /// Counts what is sent from now on: so much, up to the next time.
+    pub(super) fn count_emission(&mut self, emission: Option<Emission>) {
+        let level = emission.map_or(0.0, |emission| emission.level);
+        if let Some((since, before)) = self.spending.now.replace((self.now, level)) {
+            self.spending.sent += before * self.now.since(since).as_secs_f64();
+        }
     }
 
     /// The mode in which the vehicle flies the plan.

@@ -1,16 +1,28 @@
-//! Whether the autopilot still holds our mission.
+//! Whether the autopilot still holds our mission, and whether we are alone.
 //!
 //! A sign that somebody else sent one is looked into by reading the mission back; only a mission that differs ends the
 //! flight.
 
+use crate::clock::Time;
 use crate::link::Frame;
 use crate::link::dialect::MavMessage;
 use crate::mission::item::first_difference;
 use crate::mission::{Download, Item, List, Watch};
-use crate::telemetry::Vehicle;
+use crate::telemetry::{Mode, Vehicle};
 
 use super::settings::FlyMode;
-use super::{End, Flight, Level, Phase};
+use super::{End, Flight, Level, OTHER_LIVES, Phase};
+
+/// Others on this vehicle: programs that speak as this one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Company {
+    /// When the vehicle was met.
+    pub(super) met: Time,
+    /// When another one was heard first.
+    heard: Option<Time>,
+    /// Whether people were told.
+    is_told: bool,
+}
 
 impl Flight {
     /// From now on this mission is ours.
@@ -55,6 +67,27 @@ impl Flight {
             }
             // Silence proves nothing: the next sign asks again.
             Some(Err(_)) => self.check = None,
+        }
+    }
+
+    /// Another program on this vehicle says that it is this component. One that flies goes on; one that does not yet
+    /// does not begin. Twice: the last word of a bridge that has died may come late.
+    pub(super) fn meet_another(&mut self) {
+        let Some(first) = self.company.heard else { return self.company.heard = Some(self.now) };
+        if self.now.since(first) < OTHER_LIVES {
+            return;
+        }
+        let who = format!("another program speaks as component {} of this vehicle", self.us.component);
+        match self.phase {
+            Phase::Connect | Phase::PickUp { .. } | Phase::Deliver { .. } | Phase::Ready => {
+                self.end(End::Failed(format!("{who}: end it first")));
+            }
+            Phase::Approach { .. } => self.leave(Mode::Hold, End::Failed(format!("{who}: end it first"))),
+            Phase::Fly if !self.company.is_told => {
+                self.company.is_told = true;
+                self.say(Level::Warn, who);
+            }
+            Phase::Fly | Phase::Leave { .. } | Phase::Ended => {}
         }
     }
 

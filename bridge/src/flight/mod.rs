@@ -49,8 +49,10 @@ use crate::replan::job::Budgets;
 use crate::replan::{Answer, Job, Observation};
 use crate::setpoint::Curve;
 use crate::telemetry::timesync::Timesync;
-use crate::telemetry::{INTERVALS, Mode, Telemetry, Vehicle, mode_command};
+use crate::telemetry::{INTERVALS, LINK_TIMEOUT, Mode, Telemetry, Vehicle, mode_command};
 
+use emission::Spending;
+use guard::Company;
 pub use resume::Journal;
 pub use settings::{FlyMode, OnFailure, Settings};
 
@@ -60,6 +62,8 @@ const HEARTBEAT: Duration = Duration::from_secs(1);
 const MODE_AGAIN: Duration = Duration::from_secs(1);
 /// How old a position may be before it is asked for again.
 const FIX_MAX: Duration = Duration::from_secs(2);
+/// Time between two heartbeats of another program that show that it lives.
+const OTHER_LIVES: Duration = Duration::from_millis(500);
 /// Longest that leaving takes.
 const LEAVE_MAX: Duration = Duration::from_secs(3);
 
@@ -203,6 +207,8 @@ pub struct Flight {
     setpoint: Option<Time>,
     mode_asked: Option<Time>,
     intervals_asked: Time,
+    company: Company,
+    spending: Spending,
     link_lost: bool,
     out: Vec<Output>,
 }
@@ -279,6 +285,8 @@ impl Flight {
             setpoint: None,
             mode_asked: None,
             intervals_asked: Time::ZERO,
+            company: Company::default(),
+            spending: Spending::new(entry.jammer.map(|jammer| jammer.budget)),
             link_lost: false,
             out: Vec::new(),
         })
@@ -307,10 +315,16 @@ impl Flight {
 
     /// Something happened, or time passed.
     pub fn step(&mut self, now: Time, input: Input) -> Vec<Output> {
+        let asleep = now.since(self.now);
         // Time does not go backwards, whatever a caller says.
         self.now = self.now.max(now);
         if matches!(self.phase, Phase::Ended) {
             return Vec::new();
+        }
+        if asleep > LINK_TIMEOUT && matches!(self.phase, Phase::Fly) && self.settings.mode == FlyMode::Guided {
+            // As where the vehicle was not heard: the plan has gone on without it.
+            let seconds = asleep.as_secs_f64();
+            self.give_up(format!("the bridge's computer stood still for {seconds:.1} s while it steered"));
         }
         match input {
             Input::Tick | Input::LinkUp => {}
@@ -367,10 +381,14 @@ impl Flight {
         let Some(vehicle) = self.telemetry.vehicle().copied() else { return };
         if !was_known {
             self.us.system = vehicle.identity.system;
+            self.company.met = self.now;
             self.out.push(Output::Board(vehicle.identity.system));
             let text = format!("{:?} on system {}", vehicle.autopilot, vehicle.identity.system);
             self.say(Level::Info, text);
             self.ask_for_intervals(vehicle.identity);
+        }
+        if frame.from == self.us && matches!(frame.message, MavMessage::HEARTBEAT(_)) {
+            return self.meet_another();
         }
         let mut out = Vec::new();
         if let MavMessage::TIMESYNC(data) = &frame.message
@@ -499,6 +517,7 @@ impl Flight {
         }
         let mut out = Vec::new();
         let emission = self.emission();
+        self.count_emission(emission);
         self.relay.poll(self.now, vehicle.identity, emission, &mut out);
         self.send(out);
     }

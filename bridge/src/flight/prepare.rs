@@ -10,7 +10,7 @@ use crate::link::dialect::{MavCmd, MavMessage};
 use crate::mission::item::{fence_items, mission_items, rally_items};
 use crate::mission::{Delivery, Item, List, Watch};
 use crate::setpoint::{Sample, Steering, target};
-use crate::telemetry::{Airframe, Autopilot, Flying as InAir, Mode, Vehicle};
+use crate::telemetry::{Airframe, Autopilot, Fix, Flying as InAir, LINK_TIMEOUT, Mode, Vehicle};
 
 use super::settings::FlyMode;
 use super::{End, Flight, Level, Phase, schedule};
@@ -23,6 +23,8 @@ const STREAM_FIRST: Duration = Duration::from_secs(1);
 const BEHIND: usize = 2;
 /// How long a vehicle may take to go on at the item that it was told.
 const EXPECT_MAX: Duration = Duration::from_secs(3);
+/// How long others are listened for before a vehicle is steered: more than two of their heartbeats.
+const LISTEN: Duration = Duration::from_millis(2500);
 /// Speed below which a vehicle has arrived, m/s.
 const SPEED_MAX: f64 = 1.0;
 
@@ -91,6 +93,9 @@ impl Flight {
             // It would go on in the middle of another mission.
             return self.end(End::Failed("the vehicle flies a mission already: change its mode first".into()));
         }
+        if self.settings.mode == FlyMode::Guided && vehicle.armed && vehicle.mode == Mode::Guided {
+            return self.end(End::Failed("somebody steers the vehicle already: change its mode first".into()));
+        }
         let mission = match self.mission_of(&self.flying.plan) {
             Ok(mission) => mission,
             Err(why) => return self.end(End::Failed(why)),
@@ -150,6 +155,7 @@ impl Flight {
             return;
         }
         match self.settings.mode {
+            FlyMode::Guided if self.now.since(self.company.met) < LISTEN => {}
             FlyMode::Guided => {
                 self.say(Level::Info, "in the air: flying to the start");
                 self.phase = Phase::Approach { since: self.now };
@@ -199,9 +205,14 @@ impl Flight {
         }
     }
 
+    /// Where the vehicle is; `None` where it has not said so for a while.
+    fn fresh(&self, vehicle: &Vehicle) -> Option<Fix> {
+        vehicle.fix.filter(|fix| self.now.since(fix.heard) <= LINK_TIMEOUT)
+    }
+
     /// Distance from a position, m; infinite where the vehicle does not say where it is.
     pub(super) fn distance_m(&self, vehicle: &Vehicle, position: &[f64]) -> f64 {
-        let Some(fix) = vehicle.fix else { return f64::INFINITY };
+        let Some(fix) = self.fresh(vehicle) else { return f64::INFINITY };
         let wanted = self.frame.place(position);
         let Some(at) = self.frame.position(&fix.place) else { return f64::INFINITY };
         let unit = self.frame.unit_m();
@@ -230,7 +241,7 @@ impl Flight {
         if self.settings.mode == FlyMode::Mission {
             return;
         }
-        if let Some(position) = vehicle.fix.and_then(|fix| self.frame.position(&fix.place)) {
+        if let Some(position) = self.fresh(vehicle).and_then(|fix| self.frame.position(&fix.place)) {
             self.steer(vehicle, &Sample::rest(&position), Steering::To);
         }
     }

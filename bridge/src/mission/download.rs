@@ -93,6 +93,8 @@ impl Download {
                 // Acceptances belong to an upload before; refusals are about this question.
                 self.result = match data.mavtype {
                     MavMissionResult::MAV_MISSION_ACCEPTED | MavMissionResult::MAV_MISSION_INVALID_SEQUENCE => return,
+                    // An item of that upload came twice or late. Where it is meant, nothing else comes.
+                    MavMissionResult::MAV_MISSION_ERROR => return,
                     MavMissionResult::MAV_MISSION_OPERATION_CANCELLED => Some(Err(Failure::Cancelled)),
                     result => Some(Err(Failure::Rejected { result, item: None })),
                 };

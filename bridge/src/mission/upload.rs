@@ -24,6 +24,8 @@ const STARTS_MAX: u32 = 6;
 const NUDGES_MAX: u32 = 12;
 /// How often the last item of all is sent again before the answer counts as lost.
 const LAST_NUDGES_MAX: u32 = 4;
+/// Errors without anything new before they count as an answer.
+const ERRORS_MAX: u32 = 4;
 /// Requests in a row that bring nothing new before an autopilot counts as stuck.
 const REPEATS_MAX: u32 = 200;
 
@@ -49,6 +51,8 @@ pub struct Upload {
     asked: Vec<bool>,
     last: Option<u16>,
     repeats: u32,
+    /// Errors since something new was asked for.
+    errors: u32,
     sends: u32,
     sent: Option<Time>,
     result: Option<Result<Accepted, Failure>>,
@@ -60,7 +64,7 @@ impl Upload {
     pub fn new(talk: Talk, items: Vec<Item>, pace: Pace) -> Self {
         let asked = vec![false; items.len()];
         let result = (items.len() > usize::from(u16::MAX)).then_some(Err(Failure::TooLong));
-        Self { talk, items, pace, asked, last: None, repeats: 0, sends: 0, sent: None, result }
+        Self { talk, items, pace, asked, last: None, repeats: 0, errors: 0, sends: 0, sent: None, result }
     }
 
     /// How it ended; `None` while it goes on.
@@ -110,7 +114,7 @@ impl Upload {
             self.pace.measured(now.since(sent));
         }
         let is_new = self.asked.get_mut(usize::from(seq)).is_some_and(|asked| !std::mem::replace(asked, true));
-        self.repeats = if is_new { 0 } else { self.repeats + 1 };
+        (self.repeats, self.errors) = if is_new { (0, 0) } else { (self.repeats + 1, self.errors) };
         if self.repeats > REPEATS_MAX {
             self.result = Some(Err(Failure::Cancelled));
             return;
@@ -129,6 +133,8 @@ impl Upload {
             MavMissionResult::MAV_MISSION_OPERATION_CANCELLED => Some(Err(Failure::Cancelled)),
             // An item sent again after the end of a transfer whose acceptance was lost is an error to ArduPilot.
             MavMissionResult::MAV_MISSION_ERROR if is_whole && !self.items.is_empty() => Some(Ok(Accepted::Unknown)),
+            // Or an item of a transfer before this one, which came twice or late: an error that is meant stays.
+            MavMissionResult::MAV_MISSION_ERROR if self.errors < ERRORS_MAX => return self.errors += 1,
             result => Some(Err(Failure::Rejected { result, item: self.last })),
         };
     }

@@ -143,7 +143,9 @@ impl Telemetry {
                 };
                 let velocity = [data.vx, data.vy, data.vz].map(|part| f64::from(part) * 1e-2);
                 let above_home_m = f64::from(data.relative_alt) * 1e-3;
-                vehicle.fix = Some(Fix { heard: now, place, above_home_m, velocity });
+                if is_on_earth(&place) {
+                    vehicle.fix = Some(Fix { heard: now, place, above_home_m, velocity });
+                }
             }
             MavMessage::EXTENDED_SYS_STATE(data) => {
                 vehicle.flying = match data.landed_state {
@@ -194,10 +196,17 @@ impl Telemetry {
     }
 }
 
+/// Whether a place is one: autopilots that do not know where they are say zero, or the largest number.
+fn is_on_earth(place: &Place) -> bool {
+    let is_unknown = place.latitude_deg == 0.0 && place.longitude_deg == 0.0;
+    place.latitude_deg.abs() <= 90.0 && place.longitude_deg.abs() <= 180.0 && !is_unknown
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::link::codec::companion_heartbeat;
+    use crate::link::dialect::GLOBAL_POSITION_INT_DATA;
 
     fn heartbeat(mavtype: MavType, autopilot: MavAutopilot, custom_mode: u32) -> MavMessage {
         let MavMessage::HEARTBEAT(data) = companion_heartbeat() else { panic!("a heartbeat") };
@@ -230,6 +239,23 @@ mod tests {
         assert!(!heard.is_lost(now(6010)) && heard.is_lost(now(6011)), "no heartbeat");
         assert!(!telemetry.handle(now(30), &frame(4, 1, MavMessage::GLOBAL_POSITION_INT(Default::default()))));
         assert_eq!(telemetry.vehicle().expect("heard").fix, None);
+    }
+
+    #[test]
+    fn what_is_no_place_is_not_believed() {
+        let mut telemetry = Telemetry::new(Choice::Auto, None);
+        let px4 = heartbeat(MavType::MAV_TYPE_QUADROTOR, MavAutopilot::MAV_AUTOPILOT_PX4, 0);
+        telemetry.handle(Time::ZERO, &frame(1, 1, px4));
+        let mut say = |lat, lon| {
+            let data = GLOBAL_POSITION_INT_DATA { lat, lon, ..Default::default() };
+            telemetry.handle(Time::ZERO, &frame(1, 1, MavMessage::GLOBAL_POSITION_INT(data)));
+            telemetry.vehicle().and_then(|vehicle| vehicle.fix).map(|fix| fix.place.latitude_deg)
+        };
+        assert_eq!(say(0, 0), None);
+        assert_eq!(say(i32::MAX, i32::MAX), None);
+        assert_eq!(say(470_000_000, i32::MIN), None);
+        assert_eq!(say(470_000_000, 85_000_000), Some(47.0));
+        assert_eq!(say(0, 0), Some(47.0), "the last place that was one stays");
     }
 
     #[test]

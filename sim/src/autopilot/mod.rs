@@ -41,6 +41,7 @@ use quietpath_bridge::clock::Time;
 use quietpath_bridge::file::ScenarioFile;
 use quietpath_bridge::file::scenario::{AgentEntry, Origin};
 use quietpath_bridge::frame::{Altitude, LocalFrame, Place};
+use quietpath_bridge::link::codec::plain_bytes;
 use quietpath_bridge::link::dialect::*;
 use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::mission::{Item, List};
@@ -53,7 +54,7 @@ use param::Params;
 use payload::{Payload, Spec};
 use storage::Storage;
 use stream::Streams;
-use trouble::{Station, Trouble};
+use trouble::{Rival, Station, Trouble};
 
 /// Step of the body.
 pub const STEP: Duration = Duration::from_millis(20);
@@ -180,6 +181,17 @@ pub struct Sent {
     pub message: MavMessage,
 }
 
+impl Sent {
+    /// The frame: by `encode` where the vehicle `us` says it, unsigned where another system does.
+    pub fn bytes(&self, us: Identity, encode: impl FnOnce(u8, &MavMessage) -> Vec<u8>) -> Vec<u8> {
+        if self.from.system == us.system {
+            encode(self.from.component, &self.message)
+        } else {
+            plain_bytes(self.from, &self.message)
+        }
+    }
+}
+
 /// A simulated autopilot. See the [module](self).
 pub struct Machine {
     settings: Settings,
@@ -209,6 +221,9 @@ pub struct Machine {
     down: Option<Time>,
     killed: Option<String>,
     stations: Vec<Station>,
+    rivals: Vec<Rival>,
+    /// What others said to everybody since the last tick.
+    passed_on: Vec<(Identity, MavMessage)>,
     out: Vec<Sent>,
 }
 
@@ -248,6 +263,8 @@ impl Machine {
             down: None,
             killed: None,
             stations: Vec::new(),
+            rivals: Vec::new(),
+            passed_on: Vec::new(),
             out: Vec::new(),
             settings,
         }
@@ -264,6 +281,9 @@ impl Machine {
 
     fn hear(&mut self, frame: &Frame) {
         let mut out = Vec::new();
+        if !self.rivals.is_empty() && matches!(frame.message, MavMessage::HEARTBEAT(_)) {
+            self.passed_on.push((frame.from, frame.message.clone()));
+        }
         if self.storage.handle(self.now, frame, &mut out) {
             self.run.replaced(self.settings.like);
         }
@@ -338,7 +358,9 @@ impl Machine {
         }
         self.payloads = payloads;
         self.talk_to_stations();
-        let sent = std::mem::take(&mut self.out);
+        self.talk_to_rivals();
+        let mut sent = std::mem::take(&mut self.out);
+        self.distort(&mut sent);
         if self.is_deaf() { Vec::new() } else { sent }
     }
 

@@ -71,7 +71,7 @@ pub fn serve(
             }
         }
         for sent in machine.tick(now) {
-            let bytes = link.encode_as(sent.from.component, &sent.message);
+            let bytes = sent.bytes(machine.identity(), |component, message| link.encode_as(component, message));
             down.send(now, &bytes);
         }
         while let Some(bytes) = down.receive(now) {

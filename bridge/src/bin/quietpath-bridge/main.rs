@@ -26,7 +26,7 @@ mod state;
 mod station;
 mod transfer;
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -69,7 +69,9 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let filter = EnvFilter::try_from_env("QUIETPATH_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
     let is_terminal = std::io::stderr().is_terminal();
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(is_terminal).init();
+    // A log that cannot be written must not end a flight, and telling so on standard error would.
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    log.log_internal_errors(false).with_ansi(is_terminal).init();
     let outcome = match &arguments.command {
         Command::Run(args) => run::run(args),
         Command::Upload(args) => transfer::upload(args),
@@ -80,9 +82,12 @@ fn main() -> ExitCode {
     };
     match &outcome {
         Outcome::Done => {}
-        Outcome::Input(why) => eprintln!("quietpath-bridge: {why}"),
-        Outcome::Failed(why) | Outcome::Released(why) | Outcome::Stopped(why) | Outcome::Fault(why) => {
-            eprintln!("quietpath-bridge: {why}");
+        Outcome::Input(why)
+        | Outcome::Failed(why)
+        | Outcome::Released(why)
+        | Outcome::Stopped(why)
+        | Outcome::Fault(why) => {
+            let _ = writeln!(std::io::stderr(), "quietpath-bridge: {why}");
         }
     }
     ExitCode::from(outcome.status())

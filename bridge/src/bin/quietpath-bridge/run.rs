@@ -16,7 +16,7 @@ use quietpath_bridge::link::dialect::MavMessage;
 use quietpath_bridge::link::{Event, Link};
 use quietpath_bridge::record::{Beginning, Recorder};
 use quietpath_bridge::replan::{Answer, Worker};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 
 use crate::Outcome;
 use crate::cli::RunArgs;
@@ -126,6 +126,8 @@ impl Loop {
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(fault)?;
         }
+        // A file that may not grow any more is an error to who writes it, and not the end of the program.
+        signal_hook::flag::register(SIGXFSZ, Arc::default()).map_err(fault)?;
         let link = config.open(clock)?;
         let (status, status_log) = (Time::ZERO, Time::ZERO);
         let around = Self { link, clock, observations, worker, recorder, state, stop, status, status_log, end: None };
@@ -216,8 +218,9 @@ impl Loop {
         *due = now;
         let line = self.line(flight);
         if is_terminal {
-            eprint!("\r\x1b[2K{line}\r");
-            let _ = std::io::stderr().flush();
+            // A terminal that is gone must not end a flight.
+            let mut terminal = std::io::stderr();
+            let _ = write!(terminal, "\r\x1b[2K{line}\r").and_then(|()| terminal.flush());
         } else {
             tracing::info!("{line}");
         }
