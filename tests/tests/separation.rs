@@ -77,7 +77,7 @@ fn assert_apart(what: &str, ends: &[([f64; 2], [f64; 2])], least: f64, cost_max:
 #[test]
 fn two_that_swap_places_pass_each_other() {
     let ends = [([1.0, 5.0], [9.0, 5.0]), ([9.0, 5.0], [1.0, 5.0])];
-    assert_apart("swap", &ends, 0.5, 0.03);
+    assert_apart("swap", &ends, 0.5, 0.035);
     // Who has to give way by far had better take another way altogether, and the search looks at the ways one by one.
     assert_apart("swap, far apart", &ends, 1.5, 0.2);
 }

@@ -80,7 +80,7 @@ pub struct Planned {
     pub status: Status,
     /// What stands in the way, where there is no feasible plan; [`Obstacle::describe`] puts it into words.
     pub obstacle: Option<Obstacle>,
-    /// Iterations done.
+    /// Iterations done, of the projected gradient and of the refinement.
     pub iterations: usize,
     /// Evaluations of the objective.
     pub evaluations: usize,
@@ -182,7 +182,13 @@ fn solve<T: Real, const DIM: usize>(
     };
     memory.keep(workspace);
     let (status, obstacle) = (outcome.status, outcome.obstacle.as_ref().map(Obstacle::from));
-    Ok(Solved { plan, status, obstacle, iterations: outcome.iterations, evaluations: outcome.evaluations })
+    Ok(Solved {
+        plan,
+        status,
+        obstacle,
+        iterations: outcome.iterations + outcome.refinements,
+        evaluations: outcome.evaluations,
+    })
 }
 
 /// The planner's bounds on its work.

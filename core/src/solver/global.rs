@@ -65,7 +65,7 @@ where
         for (number, variant) in
             hurried.iter().copied().chain(unhurried(scenario).take(settings.variants)).enumerate()
         {
-            let is_settled = number > 0 && race.idle >= IDLE_MAX;
+            let is_settled = race.found.status != Status::Infeasible && race.idle >= IDLE_MAX;
             if deadline() || is_settled || number >= hurried.len() && matches!(way, Way::Open) {
                 break;
             }
@@ -95,11 +95,11 @@ where
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
         return (Status::Infeasible, closing);
     }
-    if settings.candidates > 1 && !race.is_large() {
+    if race.is_thorough() && !race.is_large() {
         race.change_sides(workspace, ledger, deadline);
     }
     let mut status = race.finish_both(workspace, ledger, deadline);
-    if has_equipment(scenario) && settings.candidates > 1 {
+    if has_equipment(scenario) && race.is_thorough() {
         for _ in 0..EQUIPS_MAX {
             let Some(again) = equip_anew(scenario, settings, workspace, ledger, deadline) else { break };
             status = again;

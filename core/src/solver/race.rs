@@ -183,7 +183,7 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         let status = self.complete(workspace, ledger, deadline);
         let gained = champion.level - ledger.best;
         let may_win = second.level - champion.level < gained * T::real(SECOND_CHANCE);
-        if !may_win || self.settings.candidates <= 1 || self.is_large() || deadline() {
+        if !may_win || !self.is_thorough() || self.is_large() || deadline() {
             return status;
         }
         let first = Found { status, least: ledger.best, barrier: ledger.barrier, ..champion };
@@ -208,10 +208,15 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
         let status = self.finish(workspace, ledger, deadline);
-        if self.settings.candidates <= 1 {
+        if !self.is_thorough() {
             return status;
         }
         self.change_times(workspace, ledger, deadline).unwrap_or(status)
+    }
+
+    /// Whether the champion is challenged; where code is to be small it never is.
+    pub(super) fn is_thorough(&self) -> bool {
+        self.settings.candidates > 1 && !cfg!(feature = "compact")
     }
 
     pub(super) fn is_large(&self) -> bool {
@@ -311,9 +316,10 @@ where
     Some(polish(scenario, settings, workspace, ledger, deadline))
 }
 
-/// Whether there is anything to do besides flying.
+/// Whether there is anything to do besides flying that is laid with the paths; without room for that, levels stay even.
 pub(super) fn has_equipment<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
-    scenario.agents.iter().any(|agent| agent.jammer.is_some() || agent.dropout.is_some())
+    !cfg!(feature = "compact")
+        && scenario.agents.iter().any(|agent| agent.jammer.is_some() || agent.dropout.is_some())
 }
 
 /// Lays levels and directions of all agents along their paths in `workspace.trial`.

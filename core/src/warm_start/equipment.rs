@@ -50,7 +50,9 @@ pub(super) struct Doing<T> {
 
 /// Levels to choose from besides 0: what the budget allows evenly, and all.
 pub(super) fn levels<T: Real>(budget: T, duration: T) -> [T; 2] {
-    [(budget / duration.max(T::MIN_POSITIVE)).clamp_to(T::zero(), T::one()), T::one()]
+    let even = (budget / duration.max(T::MIN_POSITIVE)).clamp_to(T::zero(), T::one());
+    // Without prices, all would be taken everywhere.
+    [even, if cfg!(feature = "compact") { even } else { T::one() }]
 }
 
 /// Lays levels and directions of `agent` along its path anew; returns their prices.

@@ -70,6 +70,13 @@ pub(super) struct Weights<T> {
     needs: Needs,
 }
 
+impl<T: Real> Weights<T> {
+    pub(super) const NOTHING: Self = Self {
+        of_term: [T::ZERO; TERMS_MAX],
+        needs: Needs { detection: false, false_alarm: false, location: false },
+    };
+}
+
 impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Field<'a, T, DIM, NODES, AGENTS> {
     /// `None` where there is no such agent. `pass` counts from 0 how often the tangents have been moved.
     pub(super) fn new(

@@ -89,12 +89,13 @@ pub struct Lattice<T, const CELLS: usize, const PARENTS: usize> {
     parents: [u8; PARENTS],
     moves: Moves,
     /// What the landscape is of.
-    surveyed: Option<Survey<T>>,
+    surveyed: Survey<T>,
 }
 
 /// What a landscape that does not change with time depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Survey<T> {
+    is_known: bool,
     agent: usize,
     caution: Caution,
     /// Lowest corner, then sides of a cell.
@@ -221,6 +222,18 @@ where
     }
 }
 
+impl<T: Real> Survey<T> {
+    /// All zeros, as all memory is before it is used: then it takes no room in an image.
+    const NOTHING: Self = Self {
+        is_known: false,
+        agent: 0,
+        caution: Caution::Careful,
+        grid: [[T::ZERO; 3]; 2],
+        equipment: [T::ZERO; 4],
+        weights: Weights::NOTHING,
+    };
+}
+
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, CELLS, PARENTS> {
     fn default() -> Self {
         Self::new()
@@ -232,7 +245,14 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
     #[must_use]
     pub const fn new() -> Self {
         let zero = [T::ZERO; CELLS];
-        Self { landscape: zero, cost: zero, next: zero, parents: [0; PARENTS], moves: Moves::none(), surveyed: None }
+        Self {
+            landscape: zero,
+            cost: zero,
+            next: zero,
+            parents: [0; PARENTS],
+            moves: Moves::none(),
+            surveyed: Survey::NOTHING,
+        }
     }
 
     /// One search; the path goes to the trajectory.
@@ -257,7 +277,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
 
     /// Forgets the landscape, which belongs to a scenario.
     pub(crate) fn begin(&mut self) {
-        self.surveyed = None;
+        self.surveyed = Survey::NOTHING;
     }
 
     /// All slices; the least cost and the last cell of its path.
@@ -306,17 +326,18 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         scratch: &mut [Sample<T, DIM>],
     ) {
         let key = Survey {
+            is_known: true,
             agent: field.index,
             caution,
             grid: plan.grid.described(),
             equipment: field.equipment(),
             weights: slice.weights(),
         };
-        if self.surveyed == Some(key) {
+        if self.surveyed == key {
             return;
         }
         let is_lasting = !field.is_moving() && !field.has_tangents();
-        self.surveyed = is_lasting.then_some(key);
+        self.surveyed = Survey { is_known: is_lasting, ..key };
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };

@@ -174,6 +174,15 @@ impl<T: Real> Sweep<'_, T> {
             }
             return;
         }
+        if cfg!(feature = "compact") {
+            let mut sums = [T::zero(); CHUNK];
+            sums.iter_mut().zip(ends).for_each(|(sum, end)| *sum = end);
+            for row in between {
+                sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
+            }
+            cells.zip(sums).for_each(&mut keep);
+            return;
+        }
         // Each number of cells between is a loop of its own, which the compiler makes one of vectors.
         match [between.next(), between.next(), between.next()] {
             [None, ..] => cells.zip(ends).for_each(&mut keep),
