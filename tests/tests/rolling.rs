@@ -84,7 +84,7 @@ fn assert_warm(name: &str, steps: &[Step]) {
     let [cold, warm @ ..] = steps else { panic!("no steps") };
     let most = warm.iter().map(cost).max().unwrap_or_default();
     println!("{name}: {} thousand instructions cold, {most} at most warm", cost(cold));
-    assert!(3 * most < cost(cold), "{name}: {most} for a warm step, {} for the cold one", cost(cold));
+    assert!(2 * most < cost(cold), "{name}: {most} for a warm step, {} for the cold one", cost(cold));
 }
 
 #[test]
