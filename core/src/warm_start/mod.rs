@@ -1,7 +1,7 @@
 //! The global start: dynamic programming over cells and slices of time, for one agent with the others frozen.
 //!
 //! A local method finds the best path of the basin that it starts in, and the straight line may lie in a poor one.
-//! [`search`] looks at all of them, coarsely: it cuts the part of the domain that can be reached into cells and the
+//! `search` looks at all of them, coarsely: it cuts the part of the domain that can be reached into cells and the
 //! flight into slices of a few cells each, and finds the cheapest way from start to goal,
 //!
 //! C_k(c) = min over cells b within reach of c of C_(k-1)(b) + dt mean of the running cost from b to c,
@@ -23,7 +23,7 @@
 //! a sensor costs what flying over the sensor does, where that is less than its centre, and the path goes there.
 //!
 //! Limits: 255 moves from a cell; a lagged reference point is taken as the present position; what budgets are worth is
-//! told by [`Prices`], of an earlier path.
+//! told by prices, of an earlier path.
 
 mod equipment;
 mod field;
