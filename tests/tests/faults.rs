@@ -3,8 +3,8 @@
 use quietpath_bridge::flight::FlyMode;
 use quietpath_tests::faults::{Fault, Fly, Row, all, page};
 
-/// Seeds of each fault: both autopilots, two scenarios.
-const SEEDS: std::ops::Range<u64> = 0..4;
+/// Seeds of each fault: both autopilots.
+const SEEDS: std::ops::Range<u64> = 0..2;
 /// Faults of the programs that every run of the tests flies, each in one mode.
 const PROGRAMS: [(&str, FlyMode); 4] = [
     ("killed", FlyMode::Mission),

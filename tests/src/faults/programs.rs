@@ -38,8 +38,10 @@ const BLOCKS: &str = "64";
 /// What goes wrong with the programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trial {
-    /// The bridge is killed and begun anew.
+    /// The bridge is killed and begun anew. Steered, on ArduPilot alone: PX4 has its own answer.
     Killed,
+    /// The same, steered, on PX4, which holds when setpoints end.
+    KilledOnPx4,
     /// The bridge is killed, and nobody begins it anew.
     Gone,
     /// The computer sleeps: the bridge's process is stopped, and goes on later.
@@ -69,9 +71,11 @@ fn fault(name: &'static str, says: &'static str, [steered, mission]: [Option<Out
 pub fn faults() -> Vec<Fault> {
     let both = |outcome| [Some(outcome), Some(outcome)];
     let killed = "the bridge is killed (SIGKILL) in flight and begun anew; it does not jam any more";
+    let on_px4 = "the same on PX4, which holds by itself meanwhile: the bridge does not take the vehicle back";
     let gone = "the bridge is killed (SIGKILL) in flight, and stays away: the autopilot is on its own, and silent";
     vec![
         fault("killed", killed, both(Arrives), Trial::Killed),
+        fault("killed-on-px4", on_px4, [Some(LetsGo), None], Trial::KilledOnPx4),
         fault("gone", gone, [Some(Holds), Some(Arrives)], Trial::Gone),
         fault("suspended", "the bridge's computer sleeps for 12 s", [Some(Holds), Some(Arrives)], Trial::Suspended),
         fault("terminated", "the bridge is ended (SIGTERM) in flight", [Some(Holds), None], Trial::Terminated),
@@ -84,7 +88,12 @@ pub fn faults() -> Vec<Fault> {
         ),
         fault("no-log", "the disk that the log is written to is full", both(Arrives), Trial::NoLog),
         fault("datagrams", "10 000 datagrams a second at the port for observations", both(Arrives), Trial::Flood),
-        fault("rebooted", "the autopilot is switched off in flight, and on again", both(LetsGo), Trial::Rebooted),
+        fault(
+            "rebooted",
+            "the autopilot is switched off in flight, and on again",
+            [Some(Holds), Some(LetsGo)],
+            Trial::Rebooted,
+        ),
         fault("port-taken", "a second bridge is begun at the same port", both(Arrives), Trial::Second),
     ]
 }
@@ -198,7 +207,12 @@ fn pass(seconds: f64) {
 #[must_use]
 pub fn fly(trial: Trial, mode: FlyMode, seed: u64) -> Flown {
     let mut random = Rng::with_seed(seed ^ 0x009a_97a3);
-    let like = if seed.is_multiple_of(2) { "px4" } else { "ardupilot" };
+    let like = match (trial, mode) {
+        (Trial::Killed, FlyMode::Guided) => "ardupilot",
+        (Trial::KilledOnPx4, _) => "px4",
+        _ if seed.is_multiple_of(2) => "px4",
+        _ => "ardupilot",
+    };
     let (port, tracker) = (free_port(), free_port());
     let mut programs = Programs { folder: Folder::new(), mode, port, tracker, vehicles: 0, children: Vec::new() };
     let vehicle = programs.vehicle(like);
@@ -235,11 +249,11 @@ fn strike(trial: Trial, programs: &mut Programs, bridge: &mut Child, like: &str,
     pass(after);
     let now = |programs: &Programs| programs.track(1).last().map(|moment| moment.time);
     match trial {
-        Trial::Killed | Trial::Gone => {
+        Trial::Killed | Trial::KilledOnPx4 | Trial::Gone => {
             let _ = bridge.kill();
             let _ = bridge.wait();
             let struck = now(programs);
-            if trial == Trial::Killed {
+            if trial != Trial::Gone {
                 pass(2.0);
                 *bridge = programs.bridge("exec \"$@\"", &programs.folder.path("bridge.log"));
             }

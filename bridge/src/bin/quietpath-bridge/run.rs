@@ -81,6 +81,9 @@ struct Loop {
 
 impl Loop {
     fn new(args: &RunArgs) -> Result<(Flight, Self), Outcome> {
+        let fault = |error: std::io::Error| Outcome::Fault(error.to_string());
+        // A file that may not grow any more is an error to who writes it, and not the end of the program.
+        signal_hook::flag::register(SIGXFSZ, Arc::default()).map_err(fault)?;
         let config = Config::read(&args.link)?.with_files(&args.files).with_run(args);
         let (scenario, plan) = config.load()?;
         let settings = config.flight.clone();
@@ -113,7 +116,6 @@ impl Loop {
         if let Some(recorder) = &recorder {
             tracing::info!("recording to {}", recorder.path().display());
         }
-        let fault = |error: std::io::Error| Outcome::Fault(error.to_string());
         let worker = match settings.replan {
             None => None,
             Some(replan) => {
@@ -126,8 +128,6 @@ impl Loop {
         for signal in [SIGINT, SIGTERM, SIGHUP] {
             signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(fault)?;
         }
-        // A file that may not grow any more is an error to who writes it, and not the end of the program.
-        signal_hook::flag::register(SIGXFSZ, Arc::default()).map_err(fault)?;
         let link = config.open(clock)?;
         let (status, status_log) = (Time::ZERO, Time::ZERO);
         let around = Self { link, clock, observations, worker, recorder, state, stop, status, status_log, end: None };
