@@ -1,5 +1,5 @@
 //! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
-//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `sanitize`, `deny`.
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -7,7 +7,6 @@
 mod count;
 mod firmware;
 mod fuzz;
-mod sanitize;
 mod step;
 
 use std::path::Path;
@@ -93,8 +92,6 @@ enum Command {
         #[arg(default_value_t = 10_000)]
         count: u64,
     },
-    /// Tests under Miri and with sanitizers. Needs a nightly toolchain with miri and rust-src
-    Sanitize,
     /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
@@ -136,7 +133,6 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count } => vec![numbers(*count)],
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
-        Command::Sanitize => sanitize::steps(),
         Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
         Command::Check => check(),
         Command::Test => test()?,
