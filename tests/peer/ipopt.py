@@ -43,7 +43,7 @@ INFORMATION_FLOOR = 1e-12
 AEE_SCALE = 23.964 * math.pi
 
 KNOWN = {
-    "": "name dimension softening reference_point frame grid time domain agent sensor objective region limit rolling",
+    "": "name dimension softening reference_point frame grid time domain agent sensor objective region limit rolling study",
     "agent": "name start goal start_velocity speed_max accel_max weight jammer dropout",
     "sensor": "name position track ranging detection jam",
     "region": "name center radius from until",
