@@ -80,10 +80,15 @@ fn cost(step: &Step) -> usize {
     54 * step.projection_steps + 1700 * step.factorizations + 240 * step.evaluations
 }
 
+/// The most that a warm step may cost, in thousands of instructions as counted. A bound of its own: against the first step
+/// alone, a warm one would look dear whenever the first gets cheaper.
+const WARM_MAX: usize = 200_000;
+
 fn assert_warm(name: &str, steps: &[Step]) {
     let [cold, warm @ ..] = steps else { panic!("no steps") };
     let most = warm.iter().map(cost).max().unwrap_or_default();
     println!("{name}: {} thousand instructions cold, {most} at most warm", cost(cold));
+    assert!(most < WARM_MAX, "{name}: {most} for a warm step");
     assert!(2 * most < cost(cold), "{name}: {most} for a warm step, {} for the cold one", cost(cold));
 }
 
