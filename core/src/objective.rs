@@ -160,10 +160,21 @@ pub(crate) fn merit_value<T: Real, const DIM: usize, const NODES: usize, const A
     merit: &Merit<T>,
     scratch: &mut [Sample<T, DIM>],
 ) -> T {
+    let (objective, limits) = merit_parts(scenario, trajectory, merit, scratch);
+    objective + limits
+}
+
+/// The parts of [`merit_value`]: the objective, and what the limits add.
+pub(crate) fn merit_parts<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    merit: &Merit<T>,
+    scratch: &mut [Sample<T, DIM>],
+) -> (T, T) {
     let mut tally = Tally::new(merit);
     let mut limits = T::zero();
     survey(scenario, trajectory, Which::All, merit, (&mut tally, &mut limits), scratch);
-    tally.total(scenario) + merit.objective * lateness(scenario, trajectory).0 + limits
+    (tally.total(scenario) + merit.objective * lateness(scenario, trajectory).0, limits)
 }
 
 /// The objective, and its derivatives by everything a trajectory holds, written to `gradient`.

@@ -9,7 +9,7 @@ use crate::constraints::clearance::{Clearance, clearance, separation_clearance};
 use crate::math::{Point, Real};
 use crate::metrics::Sample;
 use crate::objective::merit::{Guard, Merit, slacks};
-use crate::objective::{self, node_values};
+use crate::objective::{self, Extreme, node_values};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
 
@@ -18,18 +18,24 @@ pub(super) fn is_needed<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) 
     !scenario.regions.is_empty() || !scenario.limits.is_empty() || scenario.frame.separation.is_some()
 }
 
-/// The value of a merit, regions and separations included.
-pub(super) fn value<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+/// The objective, and the sum of -ln g over the slacks of regions, separations and limits, infinite outside them: what a
+/// merit with a barrier of any weight is made of.
+pub(super) fn parts<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
-    merit: &Merit<T>,
     scratch: &mut [Sample<T, DIM>],
-) -> T {
-    let mut sum = T::zero();
-    if merit.guard != Guard::None {
-        for_each_clearance(scenario, trajectory, |_, slack, _| sum += merit.guard.of(slack).0);
+) -> (T, T) {
+    let guard = if is_needed(scenario) { Guard::Barrier { weight: T::one() } } else { Guard::None };
+    let merit = Merit { extreme: Extreme::Exact, objective: T::one(), guard };
+    let mut logs = T::zero();
+    if guard != Guard::None {
+        for_each_clearance(scenario, trajectory, |_, slack, _| logs += guard.of(slack).0);
     }
-    if sum.finite() { sum + objective::merit_value(scenario, trajectory, merit, scratch) } else { sum }
+    if !logs.finite() {
+        return (T::zero(), logs);
+    }
+    let (objective, limits) = objective::merit_parts(scenario, trajectory, &merit, scratch);
+    (objective, logs + limits)
 }
 
 /// The value of a merit, regions and separations included, and its derivatives.

@@ -42,8 +42,6 @@ pub(super) struct Source<'a, T, const DIM: usize, const NODES: usize, const AGEN
     pub(super) iterate: &'a Iterate<T, DIM, NODES, AGENTS>,
     /// `iterate`, written out.
     pub(super) trajectory: &'a Trajectory<T, DIM, NODES, AGENTS>,
-    /// Of integral terms, penalty and guards.
-    pub(super) gradient: &'a Iterate<T, DIM, NODES, AGENTS>,
     pub(super) extremes: &'a Extremes<T>,
     /// mu.
     pub(super) barrier: T,
@@ -60,28 +58,12 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         scratch: &mut [Sample<T, DIM>],
     ) {
         let Some(offsets) = self.iterate.interior(self.frame).nth(index) else { return };
-        self.first_derivatives(index, system);
         self.balls(agent, offsets, multipliers, system);
         let domain = &self.plain.frame.domain;
         self.walls(domain, agent, offsets, multipliers, system);
         self.levels(index, agent, multipliers, system);
         for node in 1..=self.frame.intervals {
             self.node(index, agent, node, multipliers, system, scratch);
-        }
-    }
-
-    /// Minus the gradient of what [`Source::gradient`] covers; the pace's is not an agent's own.
-    fn first_derivatives(&self, index: usize, system: &mut System<T, DIM, NODES>) {
-        if let Some(slopes) = self.gradient.interior(self.frame).nth(index) {
-            for (right, slope) in system.right.path.iter_mut().zip(slopes) {
-                *right = -slope;
-            }
-        }
-        for kind in Kind::ALL {
-            let slopes = self.gradient.levels((index, kind), self.frame.intervals);
-            for (right, &slope) in system.right.control.iter_mut().zip(slopes) {
-                right[kind as usize] = -slope;
-            }
         }
     }
 
@@ -200,10 +182,14 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let (agent, node) = (at.agent_index, at.node);
         let integrals = Integrals { scenario, time };
         let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &integrals, scratch);
+        let jet = self.shared(jet, at);
+        place.add_slopes(&jet, self.frame.interval / self.iterate.pace, system);
         place.add(&jet, self.frame.interval / self.iterate.pace, Share::Integral, system);
         if !scenario.limits.is_empty() {
             let limits = Limits { scenario, barrier: self.barrier };
             let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &limits, scratch);
+            let jet = self.shared(jet, at);
+            place.add_slopes(&jet, T::one(), system);
             place.add(&jet, T::one(), Share::Node, system);
         }
         for worst in self.extremes.of(agent).filter(|worst| worst.term.window.holds(time)) {
@@ -216,6 +202,15 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
                 multipliers.extreme.get(slot).and_then(|nodes| nodes.get(node - 1)).copied().unwrap_or_default();
             place.add_worst(&jet, sign, (slack, multiplier, self.barrier), EXTREMES + slot, system);
         }
+    }
+
+    /// The jet without what other agents' jets of the same node count too: how everyone's figures change with time.
+    fn shared<const M: usize>(&self, mut jet: Jet<T, M>, at: &At<'_, T, DIM>) -> Jet<T, M> {
+        let Some(time) = at.variables.time.filter(|&time| time < M && self.frame.agents > 1) else { return jet };
+        let part = T::one() / T::from_count(self.frame.agents);
+        jet.gradient[time] *= part;
+        jet.hessian[time][time] *= part;
+        jet
     }
 
     /// Which variables the nodes of an agent have, and what each is to the system.
@@ -390,10 +385,25 @@ impl<'a, T: Real> Place<'a, T> {
             }
         }
         let own = match share {
-            Share::Integral => -T::real(4.0) * slope / self.pace + two * jet.value / (self.pace * self.pace),
+            Share::Integral => -T::real(4.0) * slope / self.pace,
             Share::Node => -two * slope / self.pace,
         };
         system.border[PACE][PACE] += weight * (bend + own);
+    }
+
+    /// Adds minus `weight` times a jet's first derivatives to the right-hand side.
+    fn add_slopes<const DIM: usize, const NODES: usize, const M: usize>(
+        &self,
+        jet: &Jet<T, M>,
+        weight: T,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let mut along = T::zero();
+        for (a, &role) in self.roles.iter().enumerate().take(M) {
+            along += jet.gradient[a] * self.along[a];
+            self.add_to_right(role, -weight * self.factor(role) * jet.gradient[a], system);
+        }
+        system.border_right[PACE] -= weight * along;
     }
 
     /// Adds the barrier of one node of a worst value epsilon: slack epsilon - sign E.
@@ -563,16 +573,18 @@ impl<T: Real> Weigh<T> for Own {
     }
 }
 
-/// Adds the barrier of a region or separation to the agent that flies the segment: its first-order part squared.
+/// Adds the barrier of a region or separation to the agent that flies the segment: its gradient, and that squared.
 ///
 /// `by_ends` are the derivatives by the positions at both ends of the segment that ends at `node`.
 pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
     system: &mut System<T, DIM, NODES>,
     (offsets, scale, pace): (&[Point<T, DIM>; NODES], T, T),
     node: usize,
-    stiffness: T,
+    (barrier, slack): (T, T),
     by_ends: &[Point<T, DIM>; 2],
 ) {
+    let push = barrier / slack;
+    let stiffness = push / slack;
     let interior = system.intervals.saturating_sub(1);
     let [by_from, by_to] = by_ends;
     let zero = Point::<T, DIM>::zeros();
@@ -582,19 +594,23 @@ pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
     let before = if node >= 1 { moved(node - 1) } else { zero };
     let by_pace = by_from.dot(&before) + by_to.dot(&moved(node));
     let (a, b) = (by_from * scale, by_to * scale);
-    let column = &mut system.columns[PACE].path;
-    if let Some((row, border)) = from.and_then(|from| system.rows.get_mut(from).zip(column.get_mut(from))) {
-        row.here += a * a.transpose() * stiffness;
-        *border += a * (stiffness * by_pace);
+    let (column, right) = (&mut system.columns[PACE].path, &mut system.right.path);
+    for (place, by_end) in [(from, a), (to, b)] {
+        let Some(place) = place else { continue };
+        let Some(((row, border), right)) =
+            system.rows.get_mut(place).zip(column.get_mut(place)).zip(right.get_mut(place))
+        else {
+            continue;
+        };
+        row.here += by_end * by_end.transpose() * stiffness;
+        *border += by_end * (stiffness * by_pace);
+        *right += by_end * push;
     }
-    if let Some((row, border)) = to.and_then(|to| system.rows.get_mut(to).zip(column.get_mut(to))) {
-        row.here += b * b.transpose() * stiffness;
-        *border += b * (stiffness * by_pace);
-        if from.is_some() {
-            row.one += b * a.transpose() * stiffness;
-        }
+    if let (Some(_), Some(row)) = (from, to.and_then(|to| system.rows.get_mut(to))) {
+        row.one += b * a.transpose() * stiffness;
     }
     system.border[PACE][PACE] += stiffness * by_pace * by_pace;
+    system.border_right[PACE] += push * by_pace;
 }
 
 /// Kinds of controls, for the sizes of this module.

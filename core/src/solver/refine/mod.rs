@@ -24,7 +24,6 @@ mod system;
 use heapless::Vec;
 
 use crate::math::Real;
-use crate::objective::merit::{Guard, Merit};
 use crate::objective::{self, Extreme};
 use crate::scenario::{Reduce, TERMS_MAX, Term, View};
 
@@ -99,7 +98,6 @@ where
     let plain = View { terms: &integral_terms, ..*scenario };
     frame.collapse(&workspace.best, &mut workspace.iterate);
     workspace.trial.assign(&workspace.best);
-    workspace.by_trajectory.assign(&workspace.best);
     let is_inside = ledger.barrier > T::zero()
         && barrier::log_slacks(&frame, &scenario.frame.domain, &workspace.iterate).finite()
         && guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) > T::zero();
@@ -117,6 +115,8 @@ where
         frame: &frame,
         extremes,
         is_guarded: guard::is_needed(scenario),
+        objective: T::zero(),
+        logs: T::zero(),
         barrier: if is_inside { ledger.barrier.min(first) } else { first },
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
         pace_multipliers: [T::zero(); 2],
@@ -192,6 +192,10 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     frame: &'a Frame<T, DIM, AGENTS>,
     extremes: Extremes<T>,
     is_guarded: bool,
+    /// Of the integral terms and the penalty, at the iterate.
+    objective: T,
+    /// Sum of -ln g over all slacks, at the iterate.
+    logs: T,
     barrier: T,
     barrier_last: T,
     /// Of the smallest and of the largest pace.
@@ -214,19 +218,20 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
         self.reset_multipliers(workspace);
+        self.weigh(workspace);
+        ledger.evaluations += 1;
         for _ in 0..self.settings.refinements {
             if deadline() {
                 return Status::Deadline;
             }
             ledger.refinements += 1;
-            ledger.evaluations += 1;
-            let merit = self.differentiate(workspace);
             let Some(step) = self.newton(workspace, ledger) else { return Status::Stalled };
             let is_centered = -step.slope <= T::real(CENTERED) * self.barrier;
-            let Some(share) = self.advance(&step, merit, workspace, ledger) else {
+            let Some(share) = self.advance(&step, workspace, ledger) else {
                 if self.barrier <= self.barrier_last {
                     return Status::Converged;
                 }
+                self.frame.expand(&workspace.iterate, &mut workspace.trial);
                 self.lower_barrier();
                 continue;
             };
@@ -244,14 +249,13 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         self.barrier = (self.barrier * T::real(BARRIER_FACTOR)).max(self.barrier_last);
     }
 
-    /// The merit of regions, separations, limits and integral terms; worst values and bounds have their own part.
-    fn merit(&self) -> Merit<T> {
-        let guard = if self.is_guarded { Guard::Barrier { weight: self.barrier } } else { Guard::None };
-        Merit { extreme: Extreme::Exact, objective: T::one(), guard }
+    /// What a step is to lower: objective and worst values, and the barriers of all slacks.
+    fn merit(&self, objective: T, extremes: &Extremes<T>, logs: T) -> T {
+        objective + extremes.total() + self.barrier * logs
     }
 
-    /// What the step is to lower, at `trial` and the worst values moved by `share` of a step; infinite outside.
-    fn rest_of_merit<const NODES: usize>(
+    /// Sum of -ln g over the slacks of bounds and worst values; infinite outside.
+    fn bound_logs<const NODES: usize>(
         &self,
         at: &Iterate<T, DIM, NODES, AGENTS>,
         extremes: &Extremes<T>,
@@ -265,20 +269,18 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             worst.for_each(self.scenario, trial, scratch, |_, signed| sum.add(worst.value - signed));
             logs += sum.total();
         }
-        let value = extremes.total() - self.barrier * logs;
-        if value.finite() { value } else { T::INFINITY }
+        if logs.finite() { -logs } else { T::INFINITY }
     }
 
-    /// Value and gradient of guards and integral terms at the iterate; returns the whole merit.
-    fn differentiate<const NODES: usize, const SENSORS: usize>(
-        &self,
+    /// Objective and slacks of the iterate, which `workspace.trial` holds written out.
+    fn weigh<const NODES: usize, const SENSORS: usize>(
+        &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> T {
-        let Workspace { iterate, trial, by_trajectory, gradient, scratch, .. } = workspace;
-        self.frame.expand(iterate, trial);
-        let value = guard::gradient(self.plain, trial, &self.merit(), scratch, by_trajectory);
-        self.frame.pull_back(iterate, by_trajectory, gradient);
-        value + self.rest_of_merit(iterate, &self.extremes, trial, scratch)
+    ) {
+        let Workspace { iterate, trial, scratch, .. } = workspace;
+        let (objective, logs) = guard::parts(self.plain, trial, scratch);
+        self.objective = objective;
+        self.logs = logs + self.bound_logs(iterate, &self.extremes, trial, scratch);
     }
 
     /// Multipliers at their central values.
@@ -344,7 +346,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 let budget = &mut multipliers.budget[kind_index];
                 *budget = update(*budget, target(rest, *budget, rest_change));
             }
-            for worst in self.extremes.of(index) {
+            // Those of worst values depend on where the iterate is, not on the step.
+            for worst in self.extremes.of(index).filter(|_| unknowns.is_none()) {
                 let Some(nodes) = multipliers.extreme.get_mut(worst.slot) else { continue };
                 worst.for_each(self.scenario, trial, scratch, |node, signed| {
                     // Towards the centre: the change of the metric itself is not known here.
@@ -385,14 +388,13 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         &self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
-        let Workspace { iterate, trial, gradient, scratch, refinement, .. } = workspace;
+        let Workspace { iterate, trial, scratch, refinement, .. } = workspace;
         let Refinement { systems, multipliers } = refinement;
         let source = Source {
             plain: self.plain,
             frame: self.frame,
             iterate,
             trajectory: trial,
-            gradient,
             extremes: &self.extremes,
             barrier: self.barrier,
         };
@@ -420,15 +422,15 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 let frame = self.frame.agent().nth(index);
                 let parts = (systems.get_mut(index), iterate.offset.get(index), frame);
                 if let (Some(system), Some(offsets), Some(agent)) = parts {
-                    let stiffness = self.barrier / (slack * slack);
                     let ends = [clearance.by_from, clearance.by_to];
-                    assemble::add_segment(system, (offsets, agent.stride / pace, pace), node, stiffness, &ends);
+                    let scales = (offsets, agent.stride / pace, pace);
+                    assemble::add_segment(system, scales, node, (self.barrier, slack), &ends);
                 }
             });
         }
     }
 
-    /// What the pace's own equation has besides the agents' parts: the gradient, the penalty's bend, its bound.
+    /// What the pace's own equation has besides the agents' parts: the intervals, the penalty, its bounds.
     fn pace_equation<const NODES: usize, const SENSORS: usize>(
         &self,
         workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
@@ -446,10 +448,15 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             weight += multiplier / slack;
             push += side * self.barrier / slack;
         }
+        let penalty = timing.penalty * late * late;
         if late > T::zero() {
             weight += two * timing.penalty * (by_pace * by_pace - late * two * by_pace / pace);
+            push -= two * timing.penalty * late * by_pace;
         }
-        (weight, push - workspace.gradient.pace)
+        // Integrals are as 1 / r where nothing else moves.
+        let integrals = self.objective - penalty;
+        weight += two * integrals / (pace * pace);
+        (weight, push + integrals / pace)
     }
 
     fn solve<const NODES: usize, const SENSORS: usize>(
@@ -509,11 +516,11 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     fn advance<const NODES: usize, const SENSORS: usize>(
         &mut self,
         step: &Move<T, AGENTS>,
-        merit: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
     ) -> Option<T> {
         let domain = &self.scenario.frame.domain;
+        let merit = self.merit(self.objective, &self.extremes, self.logs);
         let Workspace { iterate, candidate, .. } = workspace;
         let bounds = largest_share(self.frame, domain, iterate, candidate, iterate.pace)
             .min(barrier::level_share(self.frame, iterate, candidate));
@@ -528,13 +535,15 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             let Workspace { iterate, candidate, next, trial, scratch, .. } = workspace;
             next.between(iterate, candidate, share, self.frame);
             self.frame.expand(next, trial);
-            let rest = self.rest_of_merit(next, &extremes, trial, scratch);
+            let bound_logs = self.bound_logs(next, &extremes, trial, scratch);
             ledger.evaluations += 1;
-            let own = if rest.finite() { guard::value(self.plain, trial, &self.merit(), scratch) } else { T::zero() };
-            let value = rest + own;
+            let (objective, guard_logs) =
+                if bound_logs.finite() { guard::parts(self.plain, trial, scratch) } else { (T::zero(), T::INFINITY) };
+            let logs = bound_logs + guard_logs;
+            let value = self.merit(objective, &extremes, logs);
             if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
-                self.keep_if_best(own, workspace, ledger);
-                self.frame.expand(&workspace.iterate, &mut workspace.trial);
+                (self.objective, self.logs) = (objective, logs);
+                self.keep_if_best(workspace, ledger);
                 let range = T::real(MULTIPLIER_RANGE);
                 self.visit_multipliers(workspace, Some(&step.unknowns), |old, target| {
                     let floor = old * T::real(1.0 - TO_BOUNDARY);
@@ -557,23 +566,20 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
         let range = T::real(1e4);
-        self.frame.expand(&workspace.iterate, &mut workspace.trial);
         self.visit_multipliers(workspace, None, |old, central| old.clamp_to(central / range, central * range));
     }
 
-    /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better; `own` is the merit of its
-    /// integral terms and guards.
+    /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better.
     fn keep_if_best<const NODES: usize, const SENSORS: usize>(
         &self,
-        own: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
     ) {
-        let objective = if self.is_guarded || !self.extremes.0.is_empty() {
+        let objective = if self.extremes.0.is_empty() {
+            self.objective
+        } else {
             ledger.evaluations += 1;
             objective::value(self.scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch)
-        } else {
-            own
         };
         if objective < ledger.best {
             ledger.best = objective;
