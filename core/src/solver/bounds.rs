@@ -16,7 +16,7 @@
 //! every node of every agent once, and each visit every sensor.
 
 use crate::math::Real;
-use crate::warm_start::VARIANTS_MAX;
+use crate::warm_start::{Level, VARIANTS_MAX};
 
 use super::{Settings, global, neighbours, projected_gradient, race, refine};
 
@@ -58,7 +58,9 @@ impl<T: Real> Settings<T> {
         // The plan and the second, each at one flight time after another; levels and directions anew.
         let (challengers, finished) = if self.candidates > 1 {
             let retimed = 2 * race::RETIMES_MAX;
-            (neighbours::SIDES_MAX + retimed * neighbours::TIMES_MAX, 2 + retimed + race::EQUIPS_MAX)
+            let elsewhere = agents * Level::ALL.len();
+            let changed = neighbours::SIDES_MAX + elsewhere + retimed * neighbours::TIMES_MAX;
+            (changed, 2 + retimed + race::EQUIPS_MAX)
         } else {
             (0, 1)
         };
@@ -83,11 +85,11 @@ impl<T: Real> Settings<T> {
             iterations: descended,
             refinements,
             factorizations: refinements * refine::SHIFTS_MAX,
-            // Its value, the first gradient of every stage, then a line search each, and each success judged exactly.
-            evaluations: 1
+            // Its value for either, the first gradient of every stage, then a line search each, and each success judged exactly.
+            evaluations: 2
                 + (1 + projected_gradient::STAGES_MAX)
                 + descended * (self.line_search_steps + 1)
-                + refinements * (1 + refine::HALVINGS_MAX + 1),
+                + refinements * (refine::HALVINGS_MAX + 1),
             projection_steps: descended * self.projection_steps,
         }
     }

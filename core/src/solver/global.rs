@@ -98,6 +98,9 @@ where
     if race.is_thorough() && !race.is_large() {
         race.change_sides(workspace, ledger, deadline);
     }
+    if has_equipment(scenario) && race.is_thorough() && !race.is_large() {
+        race.change_levels(workspace, ledger, deadline);
+    }
     let mut status = race.finish_both(workspace, ledger, deadline);
     if has_equipment(scenario) && race.is_thorough() {
         for _ in 0..EQUIPS_MAX {

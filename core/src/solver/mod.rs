@@ -160,6 +160,7 @@ where
         evaluations: 1,
         projection_steps: 0,
         barrier: T::zero(),
+        first: T::one(),
         times: Times::Free,
         keeps: Keeps::Better,
     };
@@ -217,6 +218,9 @@ struct Ledger<T> {
     projection_steps: usize,
     /// Barrier parameter that the last refinement ended with, where the incumbent is the plan it ended with; 0 otherwise.
     barrier: T,
+    /// Part of the usual first barrier parameter that a refinement begins with: less where levels have been laid, which
+    /// a barrier draws towards their middle.
+    first: T,
     times: Times,
     keeps: Keeps,
 }

@@ -2,13 +2,13 @@
 //! the end.
 //!
 //! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`] a candidate; one second; two ways are alike where they are side by
-//! side, whatever else differs.
+//! side, with levels in about the same places.
 
 use crate::math::{Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, LARGE_TEAM, Prices};
+use crate::warm_start::{self, LARGE_TEAM, Level, Prices};
 
 use super::global::project;
 use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbours, refine};
@@ -22,10 +22,15 @@ const SECOND_CHANCE: f64 = 2.0;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
 pub(super) const EQUIPS_MAX: usize = 2;
 const EQUIPS_GAIN: f64 = 1e-6;
+/// Part of the usual barrier parameter that begins a refinement of levels laid anew, and of levels laid elsewhere.
+const ANEW: f64 = 0.01;
+const ELSEWHERE: f64 = 0.1;
 /// Times that a plan moves on to another flight time at which other nodes are before an instant.
 pub(super) const RETIMES_MAX: usize = 4;
 /// Largest distance of two paths that go the same way, over their length.
 const ALIKE: f64 = 0.04;
+/// Largest difference of their levels, over the larger ones.
+const ALIKE_LEVELS: f64 = 0.5;
 
 /// The best candidate so far; while none is feasible, the one that comes nearest to that.
 #[derive(Clone, Copy)]
@@ -171,6 +176,26 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         }
     }
 
+    /// Lets the champion jam, or be silent, elsewhere.
+    pub(super) fn change_levels<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        ledger.first = T::real(ELSEWHERE);
+        for agent in 0..self.scenario.agents.len() {
+            for level in Level::ALL {
+                workspace.best.assign(&workspace.champion);
+                let Workspace { best, lattice, scratch, .. } = workspace;
+                if !deadline() && warm_start::equip_elsewhere(self.scenario, best, (agent, level), lattice, scratch) {
+                    self.run(workspace, ledger, deadline);
+                }
+            }
+        }
+        ledger.first = T::one();
+    }
+
     /// Polishes the champion to the end, in `workspace.best`, and the second too where it could gain as much and win.
     pub(super) fn finish_both<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
         &mut self,
@@ -273,7 +298,7 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
     }
 }
 
-/// Whether two trajectories go the same way, side by side, in about the same time.
+/// Whether two trajectories go the same way, side by side, in about the same time, and do about the same on it.
 fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     one: &Trajectory<T, DIM, NODES, AGENTS>,
     other: &Trajectory<T, DIM, NODES, AGENTS>,
@@ -283,7 +308,13 @@ fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
         let steps = one.path.iter().zip(one.path.iter().skip(1)).take(nodes - 1);
         let length = steps.fold(T::zero(), |length, (from, to)| length + norm(&(to - from)));
         let apart = one.path.iter().zip(&other.path).take(nodes).map(|(one, other)| norm(&(one - other)));
-        apart.fold(T::zero(), T::max) < length * T::real(ALIKE)
+        let is_aside = apart.fold(T::zero(), T::max) < length * T::real(ALIKE);
+        let is_equipped = |one: &[T; NODES], other: &[T; NODES]| {
+            let levels = one.iter().zip(other).take(nodes);
+            let differ = levels.clone().fold(T::zero(), |sum, (&one, &other)| sum + (one - other).abs());
+            differ <= levels.fold(T::zero(), |sum, (&one, &other)| sum + one.max(other)) * T::real(ALIKE_LEVELS)
+        };
+        is_aside && is_equipped(&one.dropout, &other.dropout) && is_equipped(&one.jam, &other.jam)
     })
 }
 
@@ -312,8 +343,10 @@ where
         return None;
     }
     workspace.best.assign(&workspace.trial);
-    (ledger.best, ledger.barrier) = (objective, T::zero());
-    Some(polish(scenario, settings, workspace, ledger, deadline))
+    (ledger.best, ledger.barrier, ledger.first) = (objective, T::zero(), T::real(ANEW));
+    let status = polish(scenario, settings, workspace, ledger, deadline);
+    ledger.first = T::one();
+    Some(status)
 }
 
 /// Whether there is anything to do besides flying that is laid with the paths; without room for that, levels stay even.

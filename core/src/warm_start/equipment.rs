@@ -82,22 +82,63 @@ where
         if jammer.pattern != BeamPattern::Isotropic {
             aim(scenario, trajectory, agent, levels(jammer.budget, duration)[0], scratch);
         }
-        prices.jam = lay(scenario, trajectory, (agent, Kind::Jam), jammer.budget, lattice, scratch);
+        prices.jam = lay(scenario, trajectory, (agent, Level::Jam), (jammer.budget, Where::Best), lattice, scratch);
     }
     if let Some(dropout) = equipped.dropout {
-        prices.dropout = lay(scenario, trajectory, (agent, Kind::Dropout), dropout.budget, lattice, scratch);
+        prices.dropout =
+            lay(scenario, trajectory, (agent, Level::Dropout), (dropout.budget, Where::Best), lattice, scratch);
     }
     prices
 }
 
+/// Lays one kind of level where it does most of all places where it is not now: all at once to another place is what no
+/// local step can do. False where the agent has no such level.
+pub(crate) fn equip_elsewhere<
+    T,
+    const DIM: usize,
+    const NODES: usize,
+    const AGENTS: usize,
+    const CELLS: usize,
+    const PARENTS: usize,
+>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+    (agent, level): (usize, Level),
+    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    scratch: &mut [Sample<T, DIM>],
+) -> bool
+where
+    T: Real,
+{
+    let Some(equipped) = scenario.agents.get(agent) else { return false };
+    let budget = match level {
+        Level::Jam => equipped.jammer.map(|jammer| jammer.budget),
+        Level::Dropout => equipped.dropout.map(|dropout| dropout.budget),
+    };
+    let Some(budget) = budget else { return false };
+    lay(scenario, trajectory, (agent, level), (budget, Where::Elsewhere), lattice, scratch);
+    true
+}
+
 /// Which budget.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(crate) enum Level {
     Jam,
     Dropout,
 }
 
-impl Kind {
+/// Which nodes may have a level.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Where {
+    /// All.
+    Best,
+    /// Those that have less than half of it now.
+    Elsewhere,
+}
+
+impl Level {
+    pub(crate) const ALL: [Self; 2] = [Self::Jam, Self::Dropout];
+
     fn of<T, const DIM: usize, const NODES: usize>(self, track: &mut Track<T, DIM, NODES>) -> &mut [T; NODES] {
         match self {
             Self::Jam => &mut track.jam,
@@ -110,8 +151,8 @@ impl Kind {
 fn lay<T, const DIM: usize, const NODES: usize, const AGENTS: usize, const CELLS: usize, const PARENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
-    (agent, kind): (usize, Kind),
-    budget: T,
+    (agent, kind): (usize, Level),
+    (budget, place): (T, Where),
     lattice: &mut Lattice<T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> T
@@ -124,6 +165,14 @@ where
     let allowance = T::from_count(intervals) * budget / duration * T::real(SPENT);
     let gains = [&mut lattice.cost, &mut lattice.next].map(|gains| gains.get_mut(..intervals).unwrap_or_default());
     weigh(scenario, trajectory, (agent, kind), levels, gains, scratch);
+    if let (Where::Elsewhere, Some(track)) = (place, trajectory.tracks.get_mut(agent)) {
+        let nodes = kind.of(track).iter().skip(1).take(intervals);
+        for (_, gains) in
+            nodes.zip(lattice.cost.iter_mut().zip(&mut lattice.next)).filter(|(level, _)| **level > T::real(0.5))
+        {
+            (*gains.0, *gains.1) = (T::zero(), T::zero());
+        }
+    }
     let gains = [&lattice.cost, &lattice.next].map(|gains| gains.get(..intervals).unwrap_or_default());
     let price = price(gains, levels, allowance);
     if let Some(track) = trajectory.tracks.get_mut(agent) {
@@ -137,7 +186,7 @@ where
 fn weigh<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
-    (agent, kind): (usize, Kind),
+    (agent, kind): (usize, Level),
     levels: [T; 2],
     [half, full]: [&mut [T]; 2],
     scratch: &mut [Sample<T, DIM>],
@@ -148,8 +197,8 @@ fn weigh<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     for (index, (half, full)) in half.iter_mut().zip(full).enumerate() {
         let Some((slice, position, doing)) = field.node(index + 1) else { return };
         let at = |level: T| match kind {
-            Kind::Jam => Doing { level, dropout: T::zero(), ..doing },
-            Kind::Dropout => Doing { dropout: level, ..doing },
+            Level::Jam => Doing { level, dropout: T::zero(), ..doing },
+            Level::Dropout => Doing { dropout: level, ..doing },
         };
         let none = field.rate_at(&slice, &position, &at(T::zero()), scratch);
         for (gain, level) in [half, full].into_iter().zip(levels) {

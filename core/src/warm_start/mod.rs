@@ -43,7 +43,7 @@ use grid::{Grid, Moves};
 use obstruction::{first_blocked, first_crossed};
 use sweep::{Block, Sweep};
 
-pub(crate) use equipment::{Prices, azimuth_of_nearest, equip};
+pub(crate) use equipment::{Level, Prices, azimuth_of_nearest, equip, equip_elsewhere};
 pub(crate) use field::LARGE_TEAM;
 pub use obstruction::{Blocked, Obstruction};
 

@@ -82,16 +82,25 @@ fn gradients_are_those_of_differences() {
         assert_eq!(smallest_slack(&view, &path, &mut scratch) < 0.0, is_broken);
         let mut found = path.clone();
         let at = gradient(&view, &path, &merit, &mut scratch, &mut found);
-        assert!((at - value(&view, &path, &merit, &mut scratch)).abs() < 1e-12);
+        let value = |path: &Path, merit: &Merit<f64>, scratch: &mut [Sample<f64, 2>]| {
+            let mut gradient = path.clone();
+            super::gradient(&view, path, merit, scratch, &mut gradient)
+        };
+        let (objective, logs) = parts(&view, &path, &mut scratch);
+        if let Guard::Barrier { weight } = guard {
+            assert!((at - objective - weight * logs).abs() < 1e-12, "the parts of {at}");
+        } else {
+            assert_eq!(logs, f64::INFINITY, "outside");
+        }
         let without = Merit { guard: Guard::None, ..merit };
-        assert!((at - value(&view, &path, &without, &mut scratch)).abs() > 1e-3, "the guard counts");
+        assert!((at - value(&path, &without, &mut scratch)).abs() > 1e-3, "the guard counts");
         for agent in 0..3 {
             for node in 1..8 {
                 for axis in 0..2 {
                     let mut moved = |step: f64| {
                         let mut path = path.clone();
                         path.tracks[agent].path[node][axis] += step;
-                        value(&view, &path, &merit, &mut scratch)
+                        value(&path, &merit, &mut scratch)
                     };
                     let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                     let ours = found.tracks[agent].path[node][axis];

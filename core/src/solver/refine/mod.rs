@@ -107,7 +107,7 @@ where
     frame.expand(&workspace.iterate, &mut workspace.trial);
     let extremes = Extremes::new(scenario, &workspace.trial, &mut workspace.scratch)?;
     let scale = ledger.best.abs().max(T::one());
-    let first = T::real(FIRST_BARRIER) * scale;
+    let first = T::real(FIRST_BARRIER) * scale * ledger.first;
     let mut path = CentralPath {
         scenario,
         plain: &plain,
