@@ -55,14 +55,15 @@ impl<T: Real> Settings<T> {
         let hurried = smaller(if self.variants == 0 { 1 } else { self.variants }, VARIANTS_MAX);
         let unhurried = smaller(self.variants, VARIANTS_MAX);
         let laid = global::orders_max(agents) * (hurried + unhurried);
-        // The plan and the second, each at one flight time after another; levels and directions anew.
+        // The plan and the second, each at one flight time after another; levels and directions anew. Where nothing is feasible,
+        // one is cleared first.
         let (challengers, finished) = if self.candidates > 1 {
             let retimed = 2 * race::RETIMES_MAX;
             let elsewhere = agents * Level::ALL.len();
             let changed = neighbours::SIDES_MAX + elsewhere + retimed * neighbours::TIMES_MAX;
-            (changed, 2 + retimed + race::EQUIPS_MAX)
+            (changed, 3 + retimed + race::EQUIPS_MAX)
         } else {
-            (0, 1)
+            (0, 2)
         };
         let polished = 1 + laid + challengers;
         let projected = laid + challengers;

@@ -66,7 +66,9 @@ where
             hurried.iter().copied().chain(unhurried(scenario).take(settings.variants)).enumerate()
         {
             let is_settled = race.found.status != Status::Infeasible && race.idle >= IDLE_MAX;
-            if deadline() || is_settled || number >= hurried.len() && matches!(way, Way::Open) {
+            // Late ones are for where there is no way in time, or none that could be polished.
+            let is_late = number >= hurried.len() && race.found.status != Status::Infeasible;
+            if deadline() || is_settled || is_late {
                 break;
             }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
@@ -89,6 +91,9 @@ where
                 race.run(workspace, ledger, deadline);
             }
         }
+    }
+    if race.found.status == Status::Infeasible && matches!(way, Way::Open) {
+        race.clear(workspace, ledger, deadline);
     }
     if race.found.status == Status::Infeasible {
         workspace.best.assign(&workspace.champion);

@@ -119,12 +119,18 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) {
+        self.run_for(self.settings.iterations.min(POLISH_ITERATIONS), workspace, ledger, deadline);
+    }
+
+    fn run_for<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        iterations: usize,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
         let Self { scenario, settings, found, .. } = self;
-        let short = Settings {
-            iterations: settings.iterations.min(POLISH_ITERATIONS),
-            refinements: settings.refinements.min(POLISH_REFINEMENTS),
-            ..**settings
-        };
+        let short = Settings { iterations, refinements: settings.refinements.min(POLISH_REFINEMENTS), ..**settings };
         ledger.barrier = T::zero();
         ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
         ledger.evaluations += 1;
@@ -156,6 +162,17 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
 }
 
 impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
+    /// Leads the candidate that comes nearest to feasible out of what is in its way, with all the iterations that there are.
+    pub(super) fn clear<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        workspace.best.assign(&workspace.champion);
+        self.run_for(self.settings.iterations, workspace, ledger, deadline);
+    }
+
     /// Lets the champion pass what it passes on the other side.
     pub(super) fn change_sides<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
         &mut self,
