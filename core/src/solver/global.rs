@@ -9,7 +9,7 @@ use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, Prices, Variant};
+use crate::warm_start::{self, Lattice, Prices, Variant};
 
 use super::coordinates::Frame;
 use super::feasible::largest_share;
@@ -47,7 +47,7 @@ pub(super) fn search<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 where
     T: Real,
 {
-    workspace.lattice.begin();
+    workspace.landscape.begin();
     let mut prices = [Prices::default(); AGENTS];
     if has_equipment(scenario) {
         workspace.trial.assign(&workspace.best);
@@ -179,13 +179,15 @@ fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
     (order, prices): (usize, &[Prices<T>; AGENTS]),
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
 ) -> Result<(), Obstacle<T, DIM>> {
-    let Workspace { base, trial, lattice, scratch, .. } = workspace;
+    let Workspace { base, trial, landscape, turns, scratch, .. } = workspace;
     trial.assign(base);
+    let Some(tables) = turns.lattice() else { return Ok(()) };
+    let mut lattice = Lattice { landscape, tables };
     let agents = scenario.agents.len();
     for place in 0..agents {
         let agent = at_place(order, place, agents);
         let prices = prices.get(agent).copied().unwrap_or_default();
-        let found = warm_start::search(scenario, trial, agent, (variant, prices), lattice, scratch);
+        let found = warm_start::search(scenario, trial, agent, (variant, prices), &mut lattice, scratch);
         found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?;
     }
     keep_right(scenario, trial);

@@ -24,6 +24,7 @@
 //! - `obstacle`: what stands in the way where no feasible plan is found.
 //! - `bounds`: the most that a plan takes, from the settings alone.
 //! - `neighbours`: challengers of a good path, one decision changed.
+//! - `turns`: memory that two of them share.
 //! - `race`: candidates polished, challenged and compared.
 //! - `global`: starts from dynamic programming ([`crate::warm_start`]), polished and compared.
 //!
@@ -44,6 +45,7 @@ mod race;
 mod refine;
 mod settings;
 mod start;
+mod turns;
 mod workspace;
 
 pub use bounds::Bounds;

@@ -204,8 +204,9 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         for agent in 0..self.scenario.agents.len() {
             for level in Level::ALL {
                 workspace.best.assign(&workspace.champion);
-                let Workspace { best, lattice, scratch, .. } = workspace;
-                if !deadline() && warm_start::equip_elsewhere(self.scenario, best, (agent, level), lattice, scratch) {
+                let Workspace { best, turns, scratch, .. } = workspace;
+                let Some(tables) = turns.lattice() else { return };
+                if !deadline() && warm_start::equip_elsewhere(self.scenario, best, (agent, level), tables, scratch) {
                     self.run(workspace, ledger, deadline);
                 }
             }
@@ -378,9 +379,10 @@ pub(super) fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     prices: &mut [Prices<T>; AGENTS],
 ) {
-    let Workspace { trial, lattice, scratch, .. } = workspace;
+    let Workspace { trial, turns, scratch, .. } = workspace;
+    let Some(tables) = turns.lattice() else { return };
     for (agent, prices) in prices.iter_mut().enumerate().take(scenario.agents.len()) {
-        *prices = warm_start::equip(scenario, trial, agent, lattice, scratch);
+        *prices = warm_start::equip(scenario, trial, agent, tables, scratch);
     }
 }
 

@@ -3,11 +3,11 @@
 use crate::math::Real;
 use crate::metrics::Sample;
 use crate::trajectory::Trajectory;
-use crate::warm_start::Lattice;
+use crate::warm_start::Landscape;
 
 use super::coordinates::Iterate;
 use super::projection::Projection;
-use super::refine::Refinement;
+use super::turns::Turns;
 
 /// Cells of the global start's lattice.
 pub const LATTICE_CELLS: usize = if cfg!(feature = "compact") { 400 } else { 1024 };
@@ -30,13 +30,13 @@ pub struct Workspace<T, const DIM: usize, const NODES: usize, const SENSORS: usi
     pub(super) gradient: Iterate<T, DIM, NODES, AGENTS>,
     pub(super) gradient_next: Iterate<T, DIM, NODES, AGENTS>,
     pub(super) projection: Projection<T, DIM, NODES, AGENTS>,
-    pub(super) refinement: Refinement<T, DIM, NODES, AGENTS>,
     /// What the global start begins with, and the best candidate so far.
     pub(super) base: Trajectory<T, DIM, NODES, AGENTS>,
     pub(super) champion: Trajectory<T, DIM, NODES, AGENTS>,
     /// The best candidate that goes another way.
     pub(super) second: Trajectory<T, DIM, NODES, AGENTS>,
-    pub(super) lattice: Lattice<T, LATTICE_CELLS, LATTICE_PARENTS>,
+    pub(super) landscape: Landscape<T, LATTICE_CELLS>,
+    pub(super) turns: Turns<T, DIM, NODES, AGENTS>,
     pub(super) scratch: [Sample<T, DIM>; SENSORS],
 }
 
@@ -57,11 +57,11 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
             gradient: Iterate::zeros(),
             gradient_next: Iterate::zeros(),
             projection: Projection::empty(),
-            refinement: Refinement::empty(),
             base: Trajectory::empty(),
             champion: Trajectory::empty(),
             second: Trajectory::empty(),
-            lattice: Lattice::new(),
+            landscape: Landscape::EMPTY,
+            turns: Turns::LATTICE,
             scratch: [const { Sample::zeros() }; SENSORS],
         }
     }
@@ -97,4 +97,4 @@ impl<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const 
 }
 
 /// What 64 intervals, 16 sensors and one agent take in single precision.
-const _: () = assert!(size_of::<Workspace<f32, 2, 65, 16, 1>>() <= 88 * 1024);
+const _: () = assert!(size_of::<Workspace<f32, 2, 65, 16, 1>>() <= 64 * 1024);

@@ -20,7 +20,7 @@ use crate::metrics::Sample;
 use crate::scenario::{BeamPattern, View};
 use crate::trajectory::{Track, Trajectory};
 
-use super::Lattice;
+use super::Tables;
 use super::field::{Field, SHARPNESS};
 
 /// Part of a budget that is laid out, so that rounding does not exceed it.
@@ -69,7 +69,7 @@ pub(crate) fn equip<
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     agent: usize,
-    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    tables: &mut Tables<T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> Prices<T>
 where
@@ -82,11 +82,11 @@ where
         if jammer.pattern != BeamPattern::Isotropic {
             aim(scenario, trajectory, agent, levels(jammer.budget, duration)[0], scratch);
         }
-        prices.jam = lay(scenario, trajectory, (agent, Level::Jam), (jammer.budget, Where::Best), lattice, scratch);
+        prices.jam = lay(scenario, trajectory, (agent, Level::Jam), (jammer.budget, Where::Best), tables, scratch);
     }
     if let Some(dropout) = equipped.dropout {
         prices.dropout =
-            lay(scenario, trajectory, (agent, Level::Dropout), (dropout.budget, Where::Best), lattice, scratch);
+            lay(scenario, trajectory, (agent, Level::Dropout), (dropout.budget, Where::Best), tables, scratch);
     }
     prices
 }
@@ -104,7 +104,7 @@ pub(crate) fn equip_elsewhere<
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     (agent, level): (usize, Level),
-    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    tables: &mut Tables<T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> bool
 where
@@ -116,7 +116,7 @@ where
         Level::Dropout => equipped.dropout.map(|dropout| dropout.budget),
     };
     let Some(budget) = budget else { return false };
-    lay(scenario, trajectory, (agent, level), (budget, Where::Elsewhere), lattice, scratch);
+    lay(scenario, trajectory, (agent, level), (budget, Where::Elsewhere), tables, scratch);
     true
 }
 
@@ -153,7 +153,7 @@ fn lay<T, const DIM: usize, const NODES: usize, const AGENTS: usize, const CELLS
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     (agent, kind): (usize, Level),
     (budget, place): (T, Where),
-    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    tables: &mut Tables<T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> T
 where
@@ -163,17 +163,17 @@ where
     let levels = levels(budget, duration);
     // As many levels of 1 as the budget has intervals.
     let allowance = T::from_count(intervals) * budget / duration * T::real(SPENT);
-    let gains = [&mut lattice.cost, &mut lattice.next].map(|gains| gains.get_mut(..intervals).unwrap_or_default());
+    let gains = [&mut tables.cost, &mut tables.next].map(|gains| gains.get_mut(..intervals).unwrap_or_default());
     weigh(scenario, trajectory, (agent, kind), levels, gains, scratch);
     if let (Where::Elsewhere, Some(track)) = (place, trajectory.tracks.get_mut(agent)) {
         let nodes = kind.of(track).iter().skip(1).take(intervals);
         for (_, gains) in
-            nodes.zip(lattice.cost.iter_mut().zip(&mut lattice.next)).filter(|(level, _)| **level > T::real(0.5))
+            nodes.zip(tables.cost.iter_mut().zip(&mut tables.next)).filter(|(level, _)| **level > T::real(0.5))
         {
             (*gains.0, *gains.1) = (T::zero(), T::zero());
         }
     }
-    let gains = [&lattice.cost, &lattice.next].map(|gains| gains.get(..intervals).unwrap_or_default());
+    let gains = [&tables.cost, &tables.next].map(|gains| gains.get(..intervals).unwrap_or_default());
     let price = price(gains, levels, allowance);
     if let Some(track) = trajectory.tracks.get_mut(agent) {
         let nodes = kind.of(track).get_mut(1..=intervals).unwrap_or_default();

@@ -80,16 +80,27 @@ enum Caution {
     Through,
 }
 
-/// Memory of the search: room for `CELLS` cells, and for `PARENTS` entries, one a cell and inner slice.
+/// Running cost of each of `CELLS` cells; kept from search to search where it does not change with time.
 #[derive(Clone, Debug)]
-pub struct Lattice<T, const CELLS: usize, const PARENTS: usize> {
-    landscape: [T; CELLS],
+pub(crate) struct Landscape<T, const CELLS: usize> {
+    rates: [T; CELLS],
+    /// What they are of.
+    surveyed: Survey<T>,
+}
+
+/// Memory of one search: room for `CELLS` cells, and for `PARENTS` entries, one a cell and inner slice.
+#[derive(Clone, Debug)]
+pub(crate) struct Tables<T, const CELLS: usize, const PARENTS: usize> {
     cost: [T; CELLS],
     next: [T; CELLS],
     parents: [u8; PARENTS],
     moves: Moves,
-    /// What the landscape is of.
-    surveyed: Survey<T>,
+}
+
+/// What a search works on.
+pub(crate) struct Lattice<'a, T, const CELLS: usize, const PARENTS: usize> {
+    pub(crate) landscape: &'a mut Landscape<T, CELLS>,
+    pub(crate) tables: &'a mut Tables<T, CELLS, PARENTS>,
 }
 
 /// What a landscape that does not change with time depends on.
@@ -187,7 +198,7 @@ pub(crate) fn search<
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     agent: usize,
     (variant, prices): (&Variant<T>, Prices<T>),
-    lattice: &mut Lattice<T, CELLS, PARENTS>,
+    lattice: &mut Lattice<'_, T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> Result<T, Obstruction<T, DIM>>
 where
@@ -234,27 +245,23 @@ impl<T: Real> Survey<T> {
     };
 }
 
-impl<T: Real, const CELLS: usize, const PARENTS: usize> Default for Lattice<T, CELLS, PARENTS> {
-    fn default() -> Self {
-        Self::new()
+impl<T: Real, const CELLS: usize> Landscape<T, CELLS> {
+    /// Of nothing.
+    pub(crate) const EMPTY: Self = Self { rates: [T::ZERO; CELLS], surveyed: Survey::NOTHING };
+
+    /// Forgets what it is of, which belongs to a scenario.
+    pub(crate) fn begin(&mut self) {
+        self.surveyed = Survey::NOTHING;
     }
 }
 
-impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENTS> {
-    /// Empty memory.
-    #[must_use]
-    pub const fn new() -> Self {
-        let zero = [T::ZERO; CELLS];
-        Self {
-            landscape: zero,
-            cost: zero,
-            next: zero,
-            parents: [0; PARENTS],
-            moves: Moves::none(),
-            surveyed: Survey::NOTHING,
-        }
-    }
+impl<T: Real, const CELLS: usize, const PARENTS: usize> Tables<T, CELLS, PARENTS> {
+    /// All zeros.
+    pub(crate) const EMPTY: Self =
+        Self { cost: [T::ZERO; CELLS], next: [T::ZERO; CELLS], parents: [0; PARENTS], moves: Moves::none() };
+}
 
+impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PARENTS> {
     /// One search; the path goes to the trajectory.
     fn pass<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
@@ -266,18 +273,13 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
     ) -> Result<T, ()> {
         let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?.of_lattice();
         let plan = Plan::new(&field, variant, CELLS, PARENTS);
-        self.moves.collect(&plan.grid, plan.reach);
+        self.tables.moves.collect(&plan.grid, plan.reach);
         let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
         let track = self.trace(&field, &plan, last, trajectory, scratch);
         if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
             *slot = track;
         }
         Ok(cost)
-    }
-
-    /// Forgets the landscape, which belongs to a scenario.
-    pub(crate) fn begin(&mut self) {
-        self.surveyed = Survey::NOTHING;
     }
 
     /// All slices; the least cost and the last cell of its path.
@@ -291,7 +293,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         let (cells, counts) = (plan.grid.cells(), &plan.grid.counts);
         let count = T::from_count(plan.slices);
         let (start, goal) = (&field.agent.start, &field.agent.goal);
-        let farthest = self.moves.farthest();
+        let farthest = self.tables.moves.farthest();
         let mut alive = plan.grid.around(start, T::zero())?;
         for number in 1..=plan.slices {
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
@@ -303,7 +305,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
             if number == plan.slices {
                 return self.arrive(field, plan, &slice, caution);
             }
-            self.next.iter_mut().take(cells).for_each(|cost| *cost = T::INFINITY);
+            self.tables.next.iter_mut().take(cells).for_each(|cost| *cost = T::INFINITY);
             let wanted = wanted.meet(&reached)?;
             if number == 1 {
                 self.depart(field, plan, &slice, caution);
@@ -311,7 +313,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
                 self.advance(field, plan, (number, &slice), (&alive, &wanted), caution);
             }
             alive = wanted;
-            core::mem::swap(&mut self.cost, &mut self.next);
+            core::mem::swap(&mut self.tables.cost, &mut self.tables.next);
         }
         None
     }
@@ -333,15 +335,15 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
             equipment: field.equipment(),
             weights: slice.weights(),
         };
-        if self.surveyed == key {
+        if self.landscape.surveyed == key {
             return;
         }
         let is_lasting = !field.is_moving() && !field.has_tangents();
-        self.surveyed = Survey { is_known: is_lasting, ..key };
+        self.landscape.surveyed = Survey { is_known: is_lasting, ..key };
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
-        for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape) {
+        for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape.rates) {
             if !needed.holds(&at) {
                 continue;
             }
@@ -363,7 +365,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
             if !plan.grid.holds(&place) || !needed.holds(&plan.grid.coordinates(cell)) {
                 continue;
             }
-            let rate = self.landscape.get_mut(cell);
+            let rate = self.landscape.rates.get_mut(cell);
             if let Some(rate) = rate.filter(|rate| rate.finite()) {
                 *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch));
             }
@@ -404,7 +406,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         for (cell, (_, center)) in plan.grid.iter().enumerate() {
             if norm(&(center - start)) <= plan.reach && is_clear(field, slice, (&start, &center), caution) {
                 let mean = self.mean_from(plan, &center, &start);
-                if let Some(cost) = self.next.get_mut(cell) {
+                if let Some(cost) = self.tables.next.get_mut(cell) {
                     *cost = mean * plan.interval;
                 }
             }
@@ -421,10 +423,11 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         caution: Caution,
     ) {
         let cells = plan.grid.cells();
-        let Some(parents) = self.parents.get_mut((number - 2) * cells..(number - 1) * cells) else {
+        let Tables { cost, next, parents, moves } = &mut *self.tables;
+        let Some(parents) = parents.get_mut((number - 2) * cells..(number - 1) * cells) else {
             return;
         };
-        let Self { landscape, cost, next, moves, .. } = self;
+        let landscape = &self.landscape.rates;
         let mut sweep = Sweep { landscape, cost, next, parents, interval: plan.interval };
         let is_open = caution == Caution::Through || field.scenario.regions.is_empty();
         let clear = (!is_open).then_some(|from: usize, to: usize| {
@@ -443,7 +446,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
     ) -> Option<(T, usize)> {
         let goal = field.agent.goal;
         let mut best = None;
-        for ((cell, (_, center)), &before) in plan.grid.iter().enumerate().zip(&self.cost) {
+        for ((cell, (_, center)), &before) in plan.grid.iter().enumerate().zip(&self.tables.cost) {
             if before == T::INFINITY || norm(&(goal - center)) > plan.reach {
                 continue;
             }
@@ -470,7 +473,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
         for sample in 0..=samples {
             let cell = plan.grid.cell(&(center + step * (T::from_count(sample) / T::from_count(samples))));
             if sample == 0 || cell != last {
-                sum += self.landscape.get(cell).copied().unwrap_or(T::INFINITY);
+                sum += self.landscape.rates.get(cell).copied().unwrap_or(T::INFINITY);
                 count += 1;
             }
         }
@@ -505,8 +508,8 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<T, CELLS, PARENT
             }
             end = from;
             if number > 2 {
-                let parent = self.parents.get((number - 3) * cells + cell).copied()?;
-                cell = self.moves.origin(parent, cell);
+                let parent = self.tables.parents.get((number - 3) * cells + cell).copied()?;
+                cell = self.tables.moves.origin(parent, cell);
             }
         }
         *track.path.first_mut()? = field.agent.start;

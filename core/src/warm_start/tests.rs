@@ -70,10 +70,12 @@ fn find(
     .unwrap();
     let view = scenario.view();
     let mut path = Path::straight(&view, duration).unwrap();
-    let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
+    let mut landscape = Box::new(Landscape::EMPTY);
+    let mut tables = Box::new(Tables::<f64, 1024, 32768>::EMPTY);
+    let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 32];
     let variant = Variant { reach: 4.0, inflation: 1.12, duration, span: duration };
-    let found = search(&view, &mut path, 0, (&variant, Prices::default()), &mut lattice, &mut scratch);
+    let found = search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch);
     (path, found)
 }
 
@@ -231,10 +233,12 @@ fn finds_its_way_in_three_dimensions() {
     .unwrap();
     let view = scenario.view();
     let mut path = Trajectory::<f64, 3, 41, 1>::straight(&view, 110.0).unwrap();
-    let mut lattice = Box::new(Lattice::<f64, 1024, 32768>::new());
+    let mut landscape = Box::new(Landscape::EMPTY);
+    let mut tables = Box::new(Tables::<f64, 1024, 32768>::EMPTY);
+    let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 4];
     let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0, span: 110.0 };
-    search(&view, &mut path, 0, (&variant, Prices::default()), &mut lattice, &mut scratch).unwrap();
+    search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch).unwrap();
     // The domain is a sheet: over it is the only way around.
     let highest = path.tracks[0].path[..41].iter().map(|place| place[2]).fold(0.0, f64::max);
     assert!(highest > 1.5, "highest {highest}");

@@ -71,9 +71,9 @@ pub(super) struct Refinement<T, const DIM: usize, const NODES: usize, const AGEN
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Refinement<T, DIM, NODES, AGENTS> {
-    pub(super) const fn empty() -> Self {
-        Self { systems: [const { System::empty() }; _], multipliers: [const { Multipliers::zeros() }; _] }
-    }
+    /// All zeros.
+    pub(super) const EMPTY: Self =
+        Self { systems: [const { System::empty() }; _], multipliers: [const { Multipliers::zeros() }; _] };
 }
 
 /// Improves the incumbent `workspace.best`, which must be feasible and clear of regions and limits.
@@ -302,9 +302,9 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         unknowns: Option<&Vec<[T; COLUMNS], AGENTS>>,
         update: impl Fn(T, T) -> T,
     ) {
-        let Workspace { iterate, candidate, trial, scratch, refinement, .. } = workspace;
+        let Workspace { iterate, candidate, trial, scratch, turns, .. } = workspace;
         let (frame, barrier) = (self.frame, self.barrier);
-        let Refinement { systems, multipliers } = refinement;
+        let Some(Refinement { systems, multipliers }) = turns.refinement() else { return };
         // `candidate` is the iterate plus the whole step; the target of a multiplier is (mu - lambda dg) / g.
         let step_of = |agent: usize| systems.get(agent);
         let pace_step = if unknowns.is_some() { candidate.pace - iterate.pace } else { T::zero() };
@@ -388,8 +388,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         &self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
-        let Workspace { iterate, trial, scratch, refinement, .. } = workspace;
-        let Refinement { systems, multipliers } = refinement;
+        let Workspace { iterate, trial, scratch, turns, .. } = workspace;
+        let Some(Refinement { systems, multipliers }) = turns.refinement() else { return };
         let source = Source {
             plain: self.plain,
             frame: self.frame,
@@ -465,7 +465,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         (global_weight, global_right): (T, T),
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) -> Option<Move<T, AGENTS>> {
-        let Workspace { iterate, candidate, refinement, .. } = workspace;
+        let Workspace { iterate, candidate, turns, .. } = workspace;
+        let refinement = turns.refinement()?;
         let agents = self.frame.agents;
         let mut weight = global_weight + shift * self.frame.inertia;
         let mut right = global_right;
