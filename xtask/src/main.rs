@@ -103,7 +103,7 @@ enum Command {
     Miri,
     /// The bridge's tests, memory and threads watched; writes docs/hardening/sanitizers.md. Needs a nightly toolchain
     Sanitize,
-    /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
+    /// Licences, sources and duplicates of all dependencies, and withdrawn versions. Needs cargo-deny and cargo-audit
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
     Live,
@@ -146,7 +146,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Miri => return watched::miri(top),
         Command::Sanitize => return watched::sanitize(top),
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
-        Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
+        Command::Deny => deny(top)?,
         Command::Check => check(),
         Command::Test => test()?,
         Command::Target => return firmware::target(top),
@@ -231,6 +231,33 @@ fn numbers(count: u64, checked: u64, threads: u64) -> Vec<Step> {
     let released = format!("run --release {program} {count} --threads {threads} --out {page}");
     let checked = format!("run {program} {checked} --threads {threads} --append {page}");
     vec![Step::cargo("random problems", &released), Step::cargo("the same, with all checks on", &checked)]
+}
+
+/// Folders of workspaces: each has its own list of dependencies.
+const WORKSPACES: [&str; 3] = [".", "firmware", "fuzz"];
+
+fn deny(top: &Path) -> anyhow::Result<Vec<Step>> {
+    // The database of advisories is a repository that is not reached from everywhere. What the registry says of each
+    // version is here already, and all that is asked of cargo-audit: so it gets a database without advisories.
+    let empty = top.join("target/no-advisories");
+    std::fs::create_dir_all(empty.join("crates"))?;
+    let empty = empty.display();
+    let ours = "-c user.name=xtask -c user.email=xtask@localhost";
+    let mut steps = vec![
+        Step::cargo("dependencies", "deny check licenses bans sources"),
+        Step::new("no advisories", "git", &format!("-C {empty} init --quiet")),
+        Step::new("no advisories", "git", &format!("-C {empty} {ours} commit --quiet --allow-empty --message none")),
+    ];
+    for folder in WORKSPACES {
+        // What the registry says of a version comes with it.
+        steps.push(Step::cargo(
+            "what is there",
+            &format!("fetch --quiet --locked --manifest-path {folder}/Cargo.toml"),
+        ));
+        let audit = format!("audit --db {empty} --no-fetch --deny yanked --file {folder}/Cargo.lock");
+        steps.push(Step::cargo("withdrawn versions", &audit));
+    }
+    Ok(steps)
 }
 
 fn pictures() -> Vec<Step> {
