@@ -135,8 +135,13 @@ pub fn written(output: &Output) -> String {
 /// Writes a record and its `.tlog`.
 pub struct Recorder {
     path: PathBuf,
-    lines: BufWriter<File>,
-    tlog: BufWriter<File>,
+    files: Files<File>,
+}
+
+/// Where a record is written to.
+struct Files<W: Write> {
+    lines: BufWriter<W>,
+    tlog: BufWriter<W>,
     /// Unix time at the clock's zero, microseconds.
     epoch: u64,
     has_failed: bool,
@@ -177,7 +182,7 @@ impl Recorder {
         lines.flush()?;
         let unix = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let epoch = u64::try_from(unix.as_micros()).unwrap_or(u64::MAX).saturating_sub(now.micros());
-        Ok(Self { path, lines, tlog, epoch, has_failed: false })
+        Ok(Self { path, files: Files { lines, tlog, epoch, has_failed: false } })
     }
 
     /// Where the record is.
@@ -188,6 +193,17 @@ impl Recorder {
 
     /// Writes an input and what came out of it.
     pub fn write(&mut self, now: Time, input: &Input, outputs: &[Output]) {
+        self.files.write(now, input, outputs);
+    }
+
+    /// Writes a frame, of either direction, to the `.tlog`.
+    pub fn frame(&mut self, now: Time, bytes: &[u8]) {
+        self.files.frame(now, bytes);
+    }
+}
+
+impl<W: Write> Files<W> {
+    fn write(&mut self, now: Time, input: &Input, outputs: &[Output]) {
         if self.has_failed {
             return;
         }
@@ -207,8 +223,7 @@ impl Recorder {
         writeln!(self.lines)
     }
 
-    /// Writes a frame, of either direction, to the `.tlog`.
-    pub fn frame(&mut self, now: Time, bytes: &[u8]) {
+    fn frame(&mut self, now: Time, bytes: &[u8]) {
         if self.has_failed {
             return;
         }
@@ -409,4 +424,67 @@ pub fn replay(path: &Path, mut each: impl FnMut(Time, &[String])) -> Result<Repl
     }
     replayed.ending = reader.ending();
     Ok(replayed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::cell::{Cell, RefCell};
+    use std::rc::Rc;
+
+    /// A file on a disk that has room for some bytes, shared with who looks at it.
+    #[derive(Clone, Default)]
+    struct Disk {
+        bytes: Rc<RefCell<Vec<u8>>>,
+        room: Rc<Cell<usize>>,
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let count = bytes.len().min(self.room.get());
+            if count == 0 && !bytes.is_empty() {
+                return Err(io::ErrorKind::StorageFull.into());
+            }
+            self.room.set(self.room.get() - count);
+            self.bytes.borrow_mut().extend_from_slice(&bytes[..count]);
+            Ok(count)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    /// What is on the disks, lines and frames, of a record whose disks are full after some bytes, and again have room later.
+    fn written_with(room: [usize; 2]) -> [Vec<u8>; 2] {
+        let disks = room.map(|room| Disk { room: Rc::new(Cell::new(room)), ..Disk::default() });
+        let [lines, tlog] = disks.clone().map(BufWriter::new);
+        let mut files = Files { lines, tlog, epoch: 0, has_failed: false };
+        for number in 0..40 {
+            if number == 30 {
+                disks.iter().for_each(|disk| disk.room.set(usize::MAX));
+            }
+            // Longer than what is held back until the disk has room.
+            let text = format!("{number} ").repeat(300);
+            files.write(Time::from_millis(number), &Input::LinkDown(text.clone()), &[]);
+            files.frame(Time::from_millis(number), text.as_bytes());
+        }
+        drop(files);
+        disks.map(|disk| disk.bytes.take())
+    }
+
+    #[test]
+    fn a_disk_that_is_full_for_a_while_leaves_a_record_that_ends_there() {
+        let whole = written_with([usize::MAX; 2]);
+        assert_eq!(whole[0].iter().filter(|byte| **byte == b'\n').count(), 40);
+        for room in (0..9000).step_by(97) {
+            for rooms in [[room, usize::MAX], [usize::MAX, room], [room, room]] {
+                let found = written_with(rooms);
+                for (found, whole) in found.iter().zip(&whole) {
+                    assert!(whole.starts_with(found), "{rooms:?}: what comes after a failure is glued to it");
+                    assert!(found.len() < whole.len(), "{rooms:?}: the record has ended");
+                }
+            }
+        }
+    }
 }

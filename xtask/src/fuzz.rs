@@ -7,11 +7,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Instant;
 
 use anyhow::{Context, bail};
 
-/// Longest that one input may take, s: some plan with sanitizers on a busy machine.
-const INPUT_SECONDS: u64 = 120;
+/// Longest that one input may take, s: with sanitizers, on a busy machine.
+const INPUT_SECONDS: u64 = 10;
+/// The same where it is planned, several times.
+const PLAN_SECONDS: u64 = 120;
 /// Longest input, bytes.
 const INPUT_BYTES: u64 = 8192;
 /// Memory that a target may use, MB: the planning threads of the bridge alone reserve 256.
@@ -23,7 +26,8 @@ struct Run {
     inputs: u64,
     seconds: u64,
     seeds: usize,
-    edges: u64,
+    /// Edges of the program that were reached by the inputs that were there already, and in the end.
+    edges: [u64; 2],
     good: bool,
 }
 
@@ -45,7 +49,7 @@ pub fn fuzz(seconds: u64, only: Option<&str>, top: &Path) -> anyhow::Result<bool
         println!("[{}/{}] {target}, {seconds} s", index + 1, targets.len());
         runs.push(run(target, seconds, top)?);
     }
-    let page = page(&runs);
+    let page = page(&runs, seconds, &crate::watched::made(top)?);
     print!("{page}");
     if only.is_none() {
         let place = top.join("docs/hardening/fuzz.md");
@@ -65,11 +69,13 @@ fn run(target: &str, seconds: u64, top: &Path) -> anyhow::Result<Run> {
     if target == "scenario" {
         arguments.push(top.join("sim/scenarios").display().to_string());
     }
-    let limits = [("max_total_time", seconds), ("timeout", INPUT_SECONDS), ("max_len", INPUT_BYTES)];
+    let timeout = if target == "problem" { PLAN_SECONDS } else { INPUT_SECONDS };
+    let limits = [("max_total_time", seconds), ("timeout", timeout), ("max_len", INPUT_BYTES)];
     arguments.push("--".to_owned());
     arguments.extend(limits.map(|(name, value)| format!("-{name}={value}")));
     arguments.extend([format!("-rss_limit_mb={MEMORY_MB}"), "-print_final_stats=1".to_owned()]);
     let missing = "cannot start cargo-fuzz: rustup toolchain install nightly; cargo install cargo-fuzz";
+    let begin = Instant::now();
     let output = Command::new("rustup").args(&arguments).current_dir(top).stdout(Stdio::inherit()).output();
     let output = output.context(missing)?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -78,26 +84,35 @@ fn run(target: &str, seconds: u64, top: &Path) -> anyhow::Result<Run> {
     let Some(inputs) = figure("stat::number_of_executed_units:") else {
         bail!("{target} did not run; {missing}\n{said}");
     };
-    let edges = said.lines().rev().find_map(|line| {
-        let rest = line.split_once("cov: ")?.1;
-        rest.split(' ').next()?.parse().ok()
-    });
     let good = output.status.success();
     if !good {
         eprintln!("{said}");
     }
     let seeds = std::fs::read_dir(seeds)?.count();
-    Ok(Run { target: target.to_owned(), inputs, seconds, seeds, edges: edges.unwrap_or_default(), good })
+    let seconds = begin.elapsed().as_secs();
+    Ok(Run { target: target.to_owned(), inputs, seconds, seeds, edges: edges(&said), good })
 }
 
-fn page(runs: &[Run]) -> String {
-    let mut out = String::from(
-        "# Fuzzing\n\nWritten by `cargo xtask fuzz SECONDS`; what the targets promise stands in `tests/abuse/src/lib.rs`.\n\n\
-         | target | seeds | inputs | seconds | edges | result |\n|---|---|---|---|---|---|\n",
+/// Edges that libFuzzer says it has reached: once it had read what was there, and in the end.
+fn edges(said: &str) -> [u64; 2] {
+    let of = |line: &str| line.split_once("cov: ")?.1.split(' ').next()?.parse::<u64>().ok();
+    let begun = said.lines().find(|line| line.contains("INITED")).and_then(of);
+    let ended = said.lines().rev().find_map(of);
+    [begun, ended].map(Option::unwrap_or_default)
+}
+
+fn page(runs: &[Run], seconds: u64, made: &str) -> String {
+    let inputs: u64 = runs.iter().map(|run| run.inputs).sum();
+    let hours = runs.iter().map(|run| run.seconds).sum::<u64>() as f64 / 3600.0;
+    let mut out = format!(
+        "# Fuzzing\n\nWritten by `cargo xtask fuzz {seconds}` {made}: {inputs} inputs in {hours:.2} hours. What the targets \
+         promise stands in `tests/abuse/src/lib.rs`; *edges* are places of the program that were reached, by what was there \
+         already and in the end.\n\n\
+         | target | seeds | inputs | seconds | edges before | edges after | result |\n|---|---|---|---|---|---|---|\n",
     );
-    for Run { target, inputs, seconds, seeds, edges, good } in runs {
+    for Run { target, inputs, seconds, seeds, edges: [before, after], good } in runs {
         let result = if *good { "nothing broken" } else { "BROKEN" };
-        let _ = writeln!(out, "| {target} | {seeds} | {inputs} | {seconds} | {edges} | {result} |");
+        let _ = writeln!(out, "| {target} | {seeds} | {inputs} | {seconds} | {before} | {after} | {result} |");
     }
     out
 }
@@ -108,8 +123,18 @@ mod tests {
 
     #[test]
     fn a_broken_promise_stands_out() {
-        let run = |good| Run { target: "wire".into(), inputs: 7, seconds: 1, seeds: 2, edges: 3, good };
-        let page = page(&[run(true), run(false)]);
-        assert!(page.contains("| wire | 2 | 7 | 1 | 3 | nothing broken |") && page.contains("BROKEN"), "{page}");
+        let run = |good| Run { target: "wire".into(), inputs: 7, seconds: 1800, seeds: 2, edges: [3, 4], good };
+        let page = page(&[run(true), run(false)], 1800, "today");
+        assert!(page.contains("today: 14 inputs in 1.00 hours"), "{page}");
+        assert!(
+            page.contains("| wire | 2 | 7 | 1800 | 3 | 4 | nothing broken |") && page.contains("BROKEN"),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn edges_are_read() {
+        let said = "#1\tINITED cov: 120 ft: 300 corp: 5/1b exec/s: 0\n#9\tNEW    cov: 130 ft: 301\n#20\tDONE   cov: 131 ft: 302";
+        assert_eq!(edges(said), [120, 131]);
     }
 }

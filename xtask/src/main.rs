@@ -1,5 +1,5 @@
 //! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
-//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `deny`.
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `miri`, `sanitize`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -8,6 +8,7 @@ mod count;
 mod firmware;
 mod fuzz;
 mod step;
+mod watched;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -91,8 +92,18 @@ enum Command {
         /// Problems
         #[arg(default_value_t = 10_000)]
         count: u64,
+        /// How many of them are planned with assertions and overflow checks too
+        #[arg(long, default_value_t = 2000)]
+        checked: u64,
+        /// Problems at a time
+        #[arg(long, default_value_t = 2)]
+        threads: u64,
     },
-    /// Licences, sources and duplicates of all dependencies. Needs cargo-deny
+    /// The core's tests under Miri, a selection; writes docs/hardening/miri.md. Needs a nightly toolchain with Miri
+    Miri,
+    /// The bridge's tests, memory and threads watched; writes docs/hardening/sanitizers.md. Needs a nightly toolchain
+    Sanitize,
+    /// Licences, sources and duplicates of all dependencies, and withdrawn versions. Needs cargo-deny and cargo-audit
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
     Live,
@@ -131,9 +142,11 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         ],
         Command::Count { scenario, profile } => return count::count(scenario, *profile, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
-        Command::Numbers { count } => vec![numbers(*count)],
+        Command::Numbers { count, checked, threads } => numbers(*count, *checked, *threads),
+        Command::Miri => return watched::miri(top),
+        Command::Sanitize => return watched::sanitize(top),
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
-        Command::Deny => vec![Step::cargo("dependencies", "deny check licenses bans sources")],
+        Command::Deny => deny(top)?,
         Command::Check => check(),
         Command::Test => test()?,
         Command::Target => return firmware::target(top),
@@ -212,9 +225,39 @@ fn faults(seeds: u64, programs: u64) -> Vec<Step> {
     ]
 }
 
-fn numbers(count: u64) -> Step {
-    let program = "run --release --package quietpath-abuse --bin numbers --";
-    Step::cargo("random problems", &format!("{program} {count} --out docs/hardening/numbers.md"))
+fn numbers(count: u64, checked: u64, threads: u64) -> Vec<Step> {
+    let program = "--package quietpath-abuse --bin numbers --";
+    let page = "docs/hardening/numbers.md";
+    let released = format!("run --release {program} {count} --threads {threads} --out {page}");
+    let checked = format!("run {program} {checked} --threads {threads} --append {page}");
+    vec![Step::cargo("random problems", &released), Step::cargo("the same, with all checks on", &checked)]
+}
+
+/// Folders of workspaces: each has its own list of dependencies.
+const WORKSPACES: [&str; 3] = [".", "firmware", "fuzz"];
+
+fn deny(top: &Path) -> anyhow::Result<Vec<Step>> {
+    // The database of advisories is a repository that is not reached from everywhere. What the registry says of each
+    // version is here already, and all that is asked of cargo-audit: so it gets a database without advisories.
+    let empty = top.join("target/no-advisories");
+    std::fs::create_dir_all(empty.join("crates"))?;
+    let empty = empty.display();
+    let ours = "-c user.name=xtask -c user.email=xtask@localhost";
+    let mut steps = vec![
+        Step::cargo("dependencies", "deny check licenses bans sources"),
+        Step::new("no advisories", "git", &format!("-C {empty} init --quiet")),
+        Step::new("no advisories", "git", &format!("-C {empty} {ours} commit --quiet --allow-empty --message none")),
+    ];
+    for folder in WORKSPACES {
+        // What the registry says of a version comes with it.
+        steps.push(Step::cargo(
+            "what is there",
+            &format!("fetch --quiet --locked --manifest-path {folder}/Cargo.toml"),
+        ));
+        let audit = format!("audit --db {empty} --no-fetch --deny yanked --file {folder}/Cargo.lock");
+        steps.push(Step::cargo("withdrawn versions", &audit));
+    }
+    Ok(steps)
 }
 
 fn pictures() -> Vec<Step> {

@@ -16,7 +16,6 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -25,12 +24,14 @@ use mavlink::consts::v2::{IFLAG_SIGNED, SIGNATURE_VALUE_SIZE};
 
 use super::codec::Identity;
 use crate::clock::Time;
-use crate::file::{FileError, read_limited};
+use crate::file::{FileError, read_limited, replace};
 
 /// Timestamps reserved at a time, in 10 microseconds: 10 seconds.
 pub const RESERVE: u64 = 1_000_000;
 /// How far a new stream's timestamp may lie behind ours, in 10 microseconds: one minute.
 pub const BEHIND_MAX: u64 = 6_000_000;
+/// Largest number that a timestamp file may hold: frames have room for 48 bits, and a year must be left.
+const TIMESTAMP_MAX: u64 = (1 << 48) - 365 * 86_400 * 100_000;
 /// The beginning of 2015, seconds of Unix time.
 const EPOCH_2015: Duration = Duration::from_secs(1_420_070_400);
 
@@ -158,9 +159,12 @@ impl Signing {
         let fail =
             |message: String, help: &str| Box::new(FileError::whole(&store.display().to_string(), message, help));
         let next = match read_limited(&store) {
-            Ok(text) => String::from_utf8_lossy(&text).trim().parse().map_err(|_| {
-                fail("is not a timestamp".into(), "write a number greater than any used, in 10 us since 2015")
-            })?,
+            Ok(text) => {
+                let number: Option<u64> = String::from_utf8_lossy(&text).trim().parse().ok();
+                number.filter(|number| *number <= TIMESTAMP_MAX).ok_or_else(|| {
+                    fail("is not a timestamp".into(), "write a number greater than any used, in 10 us since 2015")
+                })?
+            }
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => 0,
             Err(error) => return Err(fail(format!("cannot be read: {error}"), "let its owner read it")),
         };
@@ -187,12 +191,7 @@ impl Signing {
         }
         let reserved = timestamp.saturating_add(RESERVE);
         if let Store::File(path) = &self.store {
-            // Written beside and renamed: a crash leaves the old number or the new one.
-            let beside = path.with_extension("timestamp.new");
-            let mut file = fs::File::create(&beside)?;
-            writeln!(file, "{reserved}")?;
-            file.sync_all()?;
-            fs::rename(&beside, path)?;
+            replace(path, format!("{reserved}\n").as_bytes())?;
         }
         self.reserved = reserved;
         Ok(())
@@ -322,6 +321,35 @@ mod tests {
         assert!(next > last && next <= last + 2 * RESERVE, "{last} {next}");
         let text = fs::read_to_string(path.with_extension("timestamp")).expect("a file beside the key");
         assert!(text.trim().parse::<u64>().expect("a number") > next);
+    }
+
+    #[test]
+    fn a_disk_that_is_full_silences_nobody() {
+        let nowhere = Store::File("/nowhere/at/all/key.timestamp".into());
+        let mut ours = Signing { store: nowhere, reserved: 0, ..signing(1000) };
+        let mut theirs = signing(1000);
+        for number in 0..3 {
+            let frame = signed(&mut ours, Time::from_millis(6000 * number));
+            assert_eq!(theirs.verify(ZERO, &frame), Ok(()));
+        }
+    }
+
+    #[test]
+    fn a_timestamp_file_is_checked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("key");
+        fs::write(&path, "ab".repeat(32)).expect("written");
+        close(&path);
+        let store = folder.path().join("key.timestamp");
+        // The last would begin anew from 0 in frames, which hold 48 bits.
+        for wrong in ["", "soon", "-5", &u64::MAX.to_string(), &(1_u64 << 48).to_string()] {
+            fs::write(&store, wrong).expect("written");
+            let error = Signing::from_key_file(&path, 0, ZERO).expect_err("no timestamp").to_string();
+            assert!(error.contains("key.timestamp: is not a timestamp"), "{error}");
+        }
+        fs::write(&store, format!("{TIMESTAMP_MAX}\n")).expect("written");
+        let mut last = Signing::from_key_file(&path, 0, ZERO).expect("a timestamp");
+        assert_eq!(signed(&mut last, ZERO).signature_timestamp(), TIMESTAMP_MAX);
     }
 
     #[test]

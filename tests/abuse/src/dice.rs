@@ -33,7 +33,7 @@ const ODD: [f64; 14] = [
 ];
 
 /// One number in this many is odd, where the mood is wild.
-const ODD_ONE_IN: usize = 24;
+const ODD_ONE_IN: usize = 100;
 
 /// Choices by bytes.
 pub struct Dice<'a> {

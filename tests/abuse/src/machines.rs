@@ -339,3 +339,24 @@ fn flight(dice: &mut Dice<'_>) {
 fn radiates(message: &MavMessage) -> bool {
     matches!(message, MavMessage::COMMAND_LONG(data) if data.command == MavCmd::MAV_CMD_USER_2 && data.param2 != 0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[should_panic(expected = "goes on after 600 s of silence")]
+    fn a_machine_without_end_is_seen() {
+        until_silence(&mut Dice::new(&[1, 2, 3], Mood::Sane), |_, _, _| false);
+    }
+
+    #[test]
+    #[should_panic(expected = "65 messages at once")]
+    fn a_machine_that_says_too_much_is_seen() {
+        let message = quietpath_bridge::link::codec::companion_heartbeat();
+        until_silence(&mut Dice::new(&[1, 2, 3], Mood::Sane), |_, _, out| {
+            out.resize(OUTPUTS_MAX + 1, message.clone());
+            true
+        });
+    }
+}

@@ -3,10 +3,10 @@
 //! It is written beside and renamed: a crash leaves the old one or the new one. While no plan is flown there is none.
 
 use std::fs;
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
-use quietpath_bridge::file::read_limited;
+use quietpath_bridge::file::{read_limited, replace};
 use quietpath_bridge::flight::Journal;
 
 /// Where the journal of a flight is kept.
@@ -41,18 +41,7 @@ impl State {
                 Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
                 _ => Ok(()),
             },
-            Some(journal) => {
-                let mut beside = path.as_os_str().to_owned();
-                beside.push(".new");
-                let beside = PathBuf::from(beside);
-                let write = || {
-                    let mut file = fs::File::create(&beside)?;
-                    file.write_all(&serde_json::to_vec(journal)?)?;
-                    file.sync_all()?;
-                    fs::rename(&beside, path)
-                };
-                write()
-            }
+            Some(journal) => serde_json::to_vec(journal).map_err(Into::into).and_then(|bytes| replace(path, &bytes)),
         };
         if let Err(error) = done {
             tracing::error!(%error, "{}: cannot be written; the flight cannot be picked up", path.display());

@@ -21,6 +21,8 @@ pub const KNOTS: usize = 8;
 
 /// Side of the domain, length units.
 const SIDE: f64 = 10.0;
+/// One problem in this many has something that no problem may have, of each kind: what is refused teaches little.
+const WRONG_ONE_IN: usize = 60;
 
 /// A sensor with a track of its own.
 #[derive(Clone, Debug)]
@@ -59,23 +61,29 @@ pub struct Problem<T, const DIM: usize> {
 impl<T: Real, const DIM: usize> Problem<T, DIM> {
     /// Draws a problem.
     pub fn draw(dice: &mut Dice<'_>) -> Self {
-        let intervals = dice.of(&[16, 8, 1, 2, 3, 4, 12, 19, 20, 0, 21]).unwrap_or(16);
-        let start_time = if dice.one_in(4) { dice.real(-50.0, 50.0) } else { T::zero() };
-        let count = 1 + usize::from(dice.one_in(4)) + usize::from(dice.one_in(60));
+        let is_wrong = |dice: &mut Dice<'_>| dice.one_in(WRONG_ONE_IN);
+        let sizes: &[usize] = if is_wrong(dice) { &[0, NODES] } else { &[16, 8, 1, 2, 3, 4, 12, 19, NODES - 1] };
+        let intervals = dice.of(sizes).unwrap_or(16);
+        let earliest = if is_wrong(dice) { -50.0 } else { 0.0 };
+        let start_time = if dice.one_in(4) { dice.real(earliest, 50.0) } else { T::zero() };
+        let count = 1 + usize::from(dice.one_in(4)) + usize::from(is_wrong(dice));
         let agents: Vec<_> = (0..count).map(|_| agent(dice)).collect();
-        let allowed = dice.of(&[1.5, 1.0, 1.001, 1.1, 2.0, 4.0, 0.9]).unwrap_or(1.5);
+        let times: &[f64] = if is_wrong(dice) { &[0.9, 0.0] } else { &[1.5, 1.0, 1.001, 1.1, 2.0, 4.0] };
+        let allowed = dice.of(times).unwrap_or(1.5);
         let fastest = |agent: &Agent<T, DIM>| (norm(&(agent.goal - agent.start)) / agent.speed_max).to_f64();
         let shortest = agents.iter().map(fastest).fold(0.0, f64::max);
         let shortest = if shortest > 0.0 { shortest } else { 10.0 };
         let max = start_time + T::real(shortest * allowed);
         let stations: Vec<_> = {
-            let count = dice.of(&[3, 4, 5, 6, 1, 2, 0, 7]).unwrap_or(3);
+            let counts: &[usize] = if is_wrong(dice) { &[0, SENSORS + 1] } else { &[3, 4, 5, SENSORS, 1, 2] };
+            let count = dice.of(counts).unwrap_or(3);
             let line = dice.one_in(6);
             (0..count).map(|index| station(dice, line.then_some(index), agents.first())).collect()
         };
         let ranging = stations.iter().filter(|station| station.ranging.is_some()).count();
         let terms = (0..1 + dice.below(2)).map(|_| term(dice, ranging > DIM)).collect();
-        let regions = (0..dice.of(&[0, 0, 0, 1, 2]).unwrap_or(0)).filter_map(|_| region(dice)).collect();
+        let ends: Vec<_> = agents.iter().flat_map(|agent| [agent.start, agent.goal]).collect();
+        let regions = (0..dice.of(&[0, 0, 0, 1, 2]).unwrap_or(0)).filter_map(|_| region(dice, &ends)).collect();
         let limits = (0..usize::from(dice.one_in(8))).map(|_| limit(dice, ranging > DIM)).collect();
         Self {
             softening: dice.real(0.01, 0.2),
@@ -138,12 +146,27 @@ fn agent<T: Real, const DIM: usize>(dice: &mut Dice<'_>) -> Agent<T, DIM> {
     Agent {
         start,
         goal,
-        start_velocity: if dice.one_in(5) { Some(dice.point(-0.2, 0.2)) } else { None },
+        start_velocity: start_velocity(dice, goal - start, speed_max),
         speed_max,
         accel_max: dice.real(0.005, 0.2),
         weight: if dice.one_in(8) { T::zero() } else { T::one() },
         jammer: if dice.one_in(3) { Some(jammer(dice)) } else { None },
         dropout: if dice.one_in(4) { Some(Dropout { budget: budget(dice) }) } else { None },
+    }
+}
+
+/// Mostly slow and towards the goal: another may not be followed in what time there is.
+fn start_velocity<T: Real, const DIM: usize>(
+    dice: &mut Dice<'_>,
+    way: Point<T, DIM>,
+    speed_max: T,
+) -> Option<Point<T, DIM>> {
+    let distance = norm(&way);
+    match dice.below(20) {
+        17 => Some(dice.point(-0.2, 0.2)),
+        18 => Some(Point::zeros()),
+        19 if distance > T::zero() => Some(way * (speed_max * dice.real(0.0, 1.0) / distance)),
+        _ => None,
     }
 }
 
@@ -199,7 +222,7 @@ fn station<T: Real, const DIM: usize>(
         0 => None,
         1..=4 => Some(Detection::Proxy { scale: dice.real(0.0, 2.0), epsilon: dice.real(0.0, 1.0), path_loss }),
         _ => Some(Detection::Energy {
-            samples: dice.of(&[100, 1, 39, 40, 41, 1001, 40_960, 0, 40_961]).unwrap_or(100),
+            samples: samples(dice),
             signal: dice.real(0.01, 10.0),
             noise: dice.real(0.01, 2.0),
             log_threshold: dice.real(-3.0, 3.0),
@@ -216,6 +239,11 @@ fn station<T: Real, const DIM: usize>(
     Station { motion, ranging, detection, jam }
 }
 
+fn samples(dice: &mut Dice<'_>) -> u32 {
+    let counts: &[u32] = if dice.one_in(WRONG_ONE_IN) { &[0, 40_961] } else { &[100, 1, 39, 40, 41, 1001, 40_960] };
+    dice.of(counts).unwrap_or(100)
+}
+
 fn pooling<T: Real>(dice: &mut Dice<'_>) -> Pooling<T> {
     match dice.below(16) {
         14 => Pooling::Uncorrelated { log_threshold: dice.real(-3.0, 3.0) },
@@ -226,7 +254,9 @@ fn pooling<T: Real>(dice: &mut Dice<'_>) -> Pooling<T> {
 
 fn window<T: Real>(dice: &mut Dice<'_>) -> Window<T> {
     if dice.one_in(5) {
-        Window { from: dice.real(0.0, 40.0), until: dice.real(20.0, 200.0) }
+        let from = dice.real(0.0, 40.0);
+        let least = if dice.one_in(WRONG_ONE_IN) { T::zero() } else { from };
+        Window { from, until: least + dice.real(0.01, 160.0) }
     } else {
         Window::always()
     }
@@ -251,16 +281,24 @@ fn term<T: Real>(dice: &mut Dice<'_>, can_locate: bool) -> Term<T> {
     }
 }
 
-fn region<T: Real>(dice: &mut Dice<'_>) -> Option<Region<T>> {
+/// A region; mostly none that an end of an agent's path is on the wrong side of.
+fn region<T: Real, const DIM: usize>(dice: &mut Dice<'_>, ends: &[Point<T, DIM>]) -> Option<Region<T>> {
     let center: Point<T, 2> = dice.point(0.0, SIDE);
     let radius: T = dice.real(0.1, 3.0);
+    let side = if dice.one_in(10) { Side::Inside } else { Side::Outside };
+    // A polygon reaches to its corners.
+    let reach = if side == Side::Outside { radius * T::real(1.5) } else { radius };
+    let is_near = |end: &Point<T, DIM>| norm(&(end.fixed_rows::<2>(0) - center)) < reach;
+    let is_right = ends.iter().all(|end| is_near(end) == (side == Side::Inside));
+    if !is_right && !dice.one_in(WRONG_ONE_IN) {
+        return None;
+    }
     let shape = if dice.one_in(3) {
         let corner = |east: f64, north: f64| center + Point::<T, 2>::new(T::real(east), T::real(north)) * radius;
         Shape::Polygon(Polygon::new(&[corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.3, 1.0)]).ok()?)
     } else {
         Shape::Circle { center, radius }
     };
-    let side = if dice.one_in(10) { Side::Inside } else { Side::Outside };
     Some(Region { shape, side, window: window(dice) })
 }
 

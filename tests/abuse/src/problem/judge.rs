@@ -75,7 +75,7 @@ pub fn judge<T: Real, const DIM: usize>(
         if outcome.status == Status::Deadline && cut.is_none_or(|cut| asked <= cut) {
             return fail("stopped at a deadline that was not over");
         }
-        if outcome.status == Status::Infeasible && is_straight {
+        if matches!(outcome.status, Status::Infeasible | Status::NonFinite) && is_straight {
             return fail("found no plan, and a straight line is one");
         }
         if matches!(outcome.status, Status::Infeasible | Status::NonFinite) {
@@ -199,4 +199,51 @@ pub fn roll<T: Real, const DIM: usize>(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dice::Mood;
+    use fastrand::Rng;
+
+    type Plan = Path<f64, 2>;
+
+    /// A problem that has a plan, and what came of it.
+    fn planned() -> (Problem<f64, 2>, Outcome<f64, 2>, Plan) {
+        let mut random = Rng::with_seed(8);
+        for _ in 0..50 {
+            let bytes: Vec<u8> = (0..2048).map(|_| random.u8(..)).collect();
+            let problem = Problem::<f64, 2>::draw(&mut Dice::new(&bytes, Mood::Sane));
+            let Ok(stored) = problem.stored() else { continue };
+            let mut memory: Box<Memory<f64, 2>> = Box::new(Workspace::new());
+            let outcome = plan(&stored.view(), &Settings::default(), Start::Global, &mut memory, &mut || false);
+            if let Ok(outcome) = outcome
+                && matches!(outcome.status, Status::Converged | Status::IterationLimit)
+            {
+                return (problem, outcome, memory.best().clone());
+            }
+        }
+        panic!("one in fifty can be planned");
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_plan_is_seen() {
+        let (problem, outcome, best) = planned();
+        let stored = problem.stored().expect("it was planned");
+        let view = stored.view();
+        let says = |change: &dyn Fn(&mut Outcome<f64, 2>, &mut Plan)| {
+            let (mut outcome, mut best) = (outcome, best.clone());
+            change(&mut outcome, &mut best);
+            wrong(&view, &Settings::default(), &outcome, &best).unwrap_or_default()
+        };
+        assert_eq!(says(&|_, _| {}), "");
+        assert!(says(&|outcome, _| outcome.objective += 1e-6).contains("another objective"));
+        assert!(says(&|outcome, _| outcome.objective = f64::NAN).contains("another objective"));
+        assert!(says(&|_, best| best.tracks[0].path[1][0] = 1e3).contains("an infeasible plan a plan"));
+        assert!(says(&|_, best| best.tracks[0].path[1][0] = f64::NAN).contains("infeasible"));
+        assert!(says(&|_, best| best.tracks[0].azimuth[1] = f64::NAN).contains("not finite"));
+        assert!(says(&|outcome, _| outcome.iterations = usize::MAX / 2).contains("without end"));
+        assert!(says(&|outcome, _| outcome.status = Status::Infeasible).contains("does not say why"));
+    }
 }

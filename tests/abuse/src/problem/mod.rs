@@ -37,7 +37,9 @@ pub fn of_kind(kind: usize, bytes: &[u8]) -> Result<Verdict, Broken> {
 /// # Panics
 /// A promise is broken.
 pub fn planned(bytes: &[u8]) {
-    let mut dice = Dice::new(bytes, Mood::Wild);
+    // The first byte says whether numbers may be anything.
+    let (first, rest) = bytes.split_first().unwrap_or((&0, &[]));
+    let mut dice = Dice::new(rest, if first % 2 == 0 { Mood::Wild } else { Mood::Sane });
     let verdict = match dice.below(4) {
         0 => one::<f64, 2>(&mut dice),
         1 => one::<f32, 2>(&mut dice),

@@ -1,0 +1,189 @@
+//! Tests under Miri and under sanitizers, and pages of what came of them.
+//!
+//! They find what a test that passes does not show: undefined behaviour in what the core is built on, memory errors and
+//! races in the bridge and its dependencies. Our own crates have no unsafe code. All of it needs a nightly toolchain:
+//! `rustup toolchain install nightly --component miri,rust-src`.
+
+use std::fmt::Write as _;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::Context as _;
+
+/// Tests of the core that Miri ends with in minutes: it is a thousand times slower than the processor, and whole plans are
+/// left to the processor.
+const UNDER_MIRI: &str = "scenario:: constraints:: error:: horizon:: trajectory:: solver::banded solver::bounds \
+                          special::gaussian jet:: math::";
+/// The target that sanitizers are built for: with one, build scripts are left out.
+const HOST: &str = "x86_64-unknown-linux-gnu";
+
+/// Tests that run under a watch.
+struct Watch {
+    what: &'static str,
+    arguments: String,
+    environment: Vec<(&'static str, String)>,
+}
+
+/// What came of them.
+struct Watched {
+    what: &'static str,
+    shown: String,
+    counts: Counts,
+    seconds: u64,
+    good: bool,
+}
+
+/// Tests that passed, failed, and were left out because they are ignored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Counts {
+    passed: u64,
+    failed: u64,
+    ignored: u64,
+}
+
+/// The core's tests under Miri, with debug assertions and without; writes `docs/hardening/miri.md`.
+///
+/// # Errors
+/// A program that cannot be started, or a page that cannot be written.
+pub fn miri(top: &Path) -> anyhow::Result<bool> {
+    let watch = |what, checks: &str| Watch {
+        what,
+        arguments: format!(
+            "miri test --package quietpath-core --lib --target-dir target/miri/{checks} -- {UNDER_MIRI}"
+        ),
+        environment: ["CARGO_PROFILE_DEV_DEBUG_ASSERTIONS", "CARGO_PROFILE_DEV_OVERFLOW_CHECKS"]
+            .map(|name| (name, checks.to_owned()))
+            .into(),
+    };
+    let watches = [watch("the core, debug assertions on", "true"), watch("the core, debug assertions off", "false")];
+    all(&watches, "Miri", "miri", top)
+}
+
+/// The bridge's tests under sanitizers; writes `docs/hardening/sanitizers.md`.
+///
+/// # Errors
+/// A program that cannot be started, or a page that cannot be written.
+pub fn sanitize(top: &Path) -> anyhow::Result<bool> {
+    // Locks of the standard library are seen only where it is built in the same way.
+    let watch = |what, name: &str, std: &str| Watch {
+        what,
+        arguments: format!(
+            "test {std}--package quietpath-bridge --tests --no-fail-fast --target {HOST} --target-dir target/sanitize/{name}"
+        ),
+        environment: vec![("RUSTFLAGS", format!("-Zsanitizer={name}"))],
+    };
+    let watches = [
+        watch("the bridge, its memory watched", "address", ""),
+        watch("the bridge, its threads watched", "thread", "-Zbuild-std "),
+    ];
+    all(&watches, "Sanitizers", "sanitizers", top)
+}
+
+fn all(watches: &[Watch], title: &str, page_name: &str, top: &Path) -> anyhow::Result<bool> {
+    let mut found = Vec::new();
+    for (index, watch) in watches.iter().enumerate() {
+        println!("[{}/{}] {}", index + 1, watches.len(), watch.what);
+        found.push(run(watch, top)?);
+    }
+    let command = if page_name == "miri" { "cargo xtask miri" } else { "cargo xtask sanitize" };
+    let page = page(title, command, &made(top)?, &found);
+    print!("{page}");
+    let place = top.join("docs/hardening").join(page_name).with_extension("md");
+    std::fs::write(&place, page).with_context(|| format!("cannot write {}", place.display()))?;
+    println!("written to {}", place.display());
+    Ok(found.iter().all(|watched| watched.good))
+}
+
+fn run(watch: &Watch, top: &Path) -> anyhow::Result<Watched> {
+    let begin = Instant::now();
+    let mut command = Command::new("rustup");
+    command.args(["run", "nightly", "cargo"]).args(watch.arguments.split_whitespace());
+    command.envs(watch.environment.iter().map(|(name, value)| (name, value)));
+    let missing = "cannot start: rustup toolchain install nightly --component miri,rust-src";
+    let mut child = command.current_dir(top).stdout(Stdio::piped()).spawn().context(missing)?;
+    let mut counts = Counts::default();
+    for line in child.stdout.take().into_iter().flat_map(|out| BufReader::new(out).lines()) {
+        let line = line?;
+        println!("{line}");
+        counts.add(&line);
+    }
+    let good = child.wait()?.success() && counts.passed > 0 && counts.failed == 0;
+    let environment: String = watch.environment.iter().map(|(name, value)| format!("{name}={value} ")).collect();
+    let shown = format!("{environment}cargo +nightly {}", watch.arguments);
+    Ok(Watched { what: watch.what, shown, counts, seconds: begin.elapsed().as_secs(), good })
+}
+
+impl Counts {
+    /// Adds what a line of the test harness says, if it says how many there were.
+    fn add(&mut self, line: &str) {
+        let Some(said) = line.strip_prefix("test result: ") else { return };
+        let words: Vec<&str> = said.split_whitespace().collect();
+        for pair in words.windows(2) {
+            let [number, what] = *pair else { continue };
+            let Ok(number) = number.parse::<u64>() else { continue };
+            match what {
+                "passed;" => self.passed += number,
+                "failed;" => self.failed += number,
+                "ignored;" => self.ignored += number,
+                _ => {}
+            }
+        }
+    }
+}
+
+/// When, of what and by which compiler a page is made.
+///
+/// # Errors
+/// A program that cannot be started.
+pub fn made(top: &Path) -> anyhow::Result<String> {
+    let said = |program: &str, arguments: &[&str]| -> anyhow::Result<String> {
+        let output = Command::new(program).args(arguments).current_dir(top).output();
+        let output = output.with_context(|| format!("cannot start {program}"))?;
+        Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let date = said("date", &["-u", "+%Y-%m-%d"])?;
+    let commit = said("git", &["describe", "--always", "--dirty"])?;
+    let compiler = said("rustup", &["run", "nightly", "rustc", "--version"])?;
+    Ok(format!("on {date}, of {commit}, by {compiler}"))
+}
+
+fn page(title: &str, command: &str, made: &str, found: &[Watched]) -> String {
+    let mut out = format!(
+        "# {title}\n\nWritten by `{command}` {made}.\n\n\
+         | tests | passed | failed | ignored | seconds, built too | result |\n|---|---|---|---|---|---|\n"
+    );
+    for Watched { what, counts: Counts { passed, failed, ignored }, seconds, good, .. } in found {
+        let result = if *good { "nothing found" } else { "FOUND SOMETHING" };
+        let _ = writeln!(out, "| {what} | {passed} | {failed} | {ignored} | {seconds} | {result} |");
+    }
+    out.push_str("\nThe commands:\n\n```sh\n");
+    for watched in found {
+        let _ = writeln!(out, "{}", watched.shown);
+    }
+    out.push_str("```\n");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_are_counted_and_what_is_found_stands_out() {
+        let mut counts = Counts::default();
+        for line in [
+            "running 3 tests",
+            "test result: ok. 12 passed; 0 failed; 3 ignored; 0 measured; 40 filtered out; finished in 0.60s",
+            "test result: FAILED. 1 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 1.00s",
+        ] {
+            counts.add(line);
+        }
+        assert_eq!(counts, Counts { passed: 13, failed: 2, ignored: 3 });
+        let watched = |good| Watched { what: "the core", shown: "cargo".into(), counts, seconds: 5, good };
+        let page = page("Miri", "cargo xtask miri", "today", &[watched(true), watched(false)]);
+        assert!(page.contains("| the core | 13 | 2 | 3 | 5 | nothing found |"), "{page}");
+        assert!(page.contains("| 5 | FOUND SOMETHING |"), "{page}");
+    }
+}
