@@ -183,6 +183,15 @@ impl<T: Real, const DIM: usize> AgentFrame<T, DIM> {
     }
 }
 
+/// Part of the time there is that a flight takes at least.
+const BRIEFEST: f64 = 1e-3;
+
+/// Shortest flight time where all agents are at their goals to begin with, s: any shorter one would be as good, down to none,
+/// and in no time nothing has a speed.
+pub(super) fn briefest_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
+    (scenario.frame.time.max - scenario.frame.start_time) * T::real(BRIEFEST)
+}
+
 /// The map between iterates and trajectories of one scenario.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame<T, const DIM: usize, const AGENTS: usize> {
@@ -196,7 +205,8 @@ pub(super) struct Frame<T, const DIM: usize, const AGENTS: usize> {
     pub(super) start_time: T,
     /// Smallest pace: the whole of the time there is.
     pub(super) pace_min: T,
-    /// Largest pace, where the flight is held to the times between which no node crosses an instant at which terms change.
+    /// Largest pace, where the flight is held to the times between which no node crosses an instant at which terms change, or
+    /// where nobody has anywhere to go.
     pub(super) pace_max: Option<T>,
     /// Weight m of the squared pace in the metric.
     pub(super) inertia: T,
@@ -251,6 +261,9 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
         let stretch: T =
             frame.agent().map(|a| norm_squared(&a.reach) / count).fold(T::zero(), |sum, part| sum + part);
         frame.inertia = stretch + count * T::from_count(agents.max(1));
+        if frame.agent().all(|agent| norm_squared(&agent.line) == T::zero()) {
+            frame.pace_max = Some(duration / briefest_duration(scenario));
+        }
         frame
     }
 
@@ -258,7 +271,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
     pub(super) fn hold(&mut self, [shortest, longest]: [Option<T>; 2]) {
         let whole = self.duration(T::one());
         self.pace_min = longest.map_or(self.pace_min, |longest| self.pace_min.max(whole / longest));
-        self.pace_max = shortest.map(|shortest| whole / shortest);
+        let most = shortest.map(|shortest| whole / shortest);
+        self.pace_max = most.map_or(self.pace_max, |most| Some(self.pace_max.map_or(most, |known| known.min(most))));
     }
 
     /// Room to the smallest pace, and to the largest where there is one.

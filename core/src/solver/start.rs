@@ -13,7 +13,7 @@ use crate::scenario::View;
 use crate::trajectory::Trajectory;
 use crate::warm_start::azimuth_of_nearest;
 
-use super::coordinates::Frame;
+use super::coordinates::{Frame, briefest_duration};
 use super::projection::Request;
 use super::{Settings, Workspace};
 
@@ -36,10 +36,11 @@ pub enum Start<'a, T, const DIM: usize, const NODES: usize, const AGENTS: usize>
     Given(&'a Trajectory<T, DIM, NODES, AGENTS>),
 }
 
-/// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4.
+/// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4. Where nobody has anywhere to go, a
+/// little of the time there is, so that there is a flight.
 pub(super) fn shortest_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
     let times = scenario.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
-    times.fold(T::zero(), T::max)
+    times.fold(briefest_duration(scenario), T::max)
 }
 
 /// Whether the time there is is the shortest flight time itself: then the straight line is all there is, and the
