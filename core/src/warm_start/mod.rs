@@ -301,7 +301,12 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
             let left = plan.reach * T::from_count(plan.slices - number);
             let wanted = plan.grid.around(goal, left)?;
-            let reached = alive.grown(if number == 1 { farthest + 1 } else { farthest }, counts);
+            // The first slice goes straight from the start, as far as a slice reaches: farther than any move, where slices are few.
+            let reached = if number == 1 {
+                plan.grid.around(start, plan.reach)?.grown(1, counts)
+            } else {
+                alive.grown(farthest, counts)
+            };
             let needed = if number == plan.slices { alive.hull(&wanted) } else { reached };
             self.survey(field, plan, (&slice, &needed), caution, scratch);
             if number == plan.slices {

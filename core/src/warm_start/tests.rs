@@ -34,6 +34,17 @@ fn find(
     reduce: Reduce,
     duration: f64,
 ) -> (Path, Found) {
+    find_with((4.0, 0.0), sensors, (regions, limits), reduce, duration)
+}
+
+/// The same with slices that reach so many cells, in memory that holds such rates.
+fn find_with(
+    (reach, rate): (f64, f64),
+    sensors: &[Sensor<'_, f64, 2>],
+    (regions, limits): (&[Region<f64>], &[Limit<f64>]),
+    reduce: Reduce,
+    duration: f64,
+) -> (Path, Found) {
     let agent = Agent {
         start: Place::new(1.0, 5.0),
         goal: Place::new(9.0, 5.0),
@@ -71,10 +82,11 @@ fn find(
     let view = scenario.view();
     let mut path = Path::straight(&view, duration).unwrap();
     let mut landscape = Box::new(Landscape::EMPTY);
+    landscape.rates.fill(rate);
     let mut tables = Box::new(Tables::<f64, 1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 32];
-    let variant = Variant { reach: 4.0, inflation: 1.12, duration, span: duration };
+    let variant = Variant { reach, inflation: 1.12, duration, span: duration };
     let found = search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch);
     (path, found)
 }
@@ -186,6 +198,21 @@ fn gives_way_to_a_moving_sensor_when_it_comes() {
             .map(|(place, time)| norm(&(place - Place::new(5.0, from + (to - from) * time / 110.0))))
             .fold(f64::INFINITY, f64::min);
         assert!(closest > 2.0, "closest {closest}");
+    }
+}
+
+/// Slices that reach farther than any move look at more cells from the start.
+#[test]
+fn what_the_memory_held_before_does_not_count() {
+    let track =
+        [Knot { time: 0.0, position: Place::new(5.0, 2.0) }, Knot { time: 110.0, position: Place::new(5.0, 8.0) }];
+    for reach in [4.0, 9.0, 14.0] {
+        let with = |rate: f64| {
+            find_with((reach, rate), &[sensor(Motion::Track(&track))], (&[], &[]), Reduce::Integral, 110.0)
+        };
+        let (clean, used) = (with(0.0), with(-1e6));
+        assert_eq!(clean.1, used.1, "reach {reach}");
+        assert_eq!(nodes(&clean.0), nodes(&used.0), "reach {reach}");
     }
 }
 

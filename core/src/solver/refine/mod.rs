@@ -576,7 +576,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
     ) {
-        let objective = if self.extremes.0.is_empty() {
+        // Terms without an unknown of their own count too: a node may have come into the window of one.
+        let objective = if self.plain.terms.len() == self.scenario.terms.len() {
             self.objective
         } else {
             ledger.evaluations += 1;
