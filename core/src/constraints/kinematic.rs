@@ -9,29 +9,47 @@
 //! |v_i| <= speed_max, |a_i| <= accel_max, and with a start velocity also |v_1 - v| / h_1 <= accel_max; where the start
 //! is a seam that an interval h_0 leads up to, 2 |v_1 - v| / (h_1 + h_0) <= accel_max.
 //!
+//! Positions and times are rounded to what the number type holds, and velocities and accelerations can be known to within
+//! what that makes of them only; so much is not held against a path. In double precision it is nothing, in single precision
+//! it is what short intervals far from the origin have.
+//!
 //! Source: section 4.1, and Remark 3.3.3 for seams.
 
 use crate::constraints::Worst;
 use crate::math::{Point, Real, norm};
 
-/// Velocities and intervals of a path; a velocity is infinite where the interval is not longer than zero.
+/// A velocity, the interval that it is flown for, and how far the rounding of positions and times may have moved it.
+#[derive(Clone, Copy)]
+struct Flown<T, const DIM: usize> {
+    interval: T,
+    velocity: Point<T, DIM>,
+    rounding: T,
+}
+
+/// Velocities of a path; infinite where the interval is not longer than zero.
 fn velocities<T: Real, const DIM: usize>(
     times: &[T],
     path: &[Point<T, DIM>],
-) -> impl Iterator<Item = (T, Point<T, DIM>)> + Clone {
+) -> impl Iterator<Item = Flown<T, DIM>> + Clone {
     let steps = path.iter().zip(path.iter().skip(1));
-    let intervals = times.iter().zip(times.iter().skip(1)).map(|(&from, &to)| to - from);
-    intervals.zip(steps).map(|(interval, (from, to))| {
-        let velocity = if interval > T::zero() { (to - from) / interval } else { Point::repeat(T::INFINITY) };
-        (interval, velocity)
+    let ends = times.iter().zip(times.iter().skip(1));
+    ends.zip(steps).map(|((&start, &end), (from, to))| {
+        let interval = end - start;
+        if interval > T::zero() {
+            let velocity = (to - from) / interval;
+            let places = norm(from) + norm(to) + norm(&velocity) * (start.abs() + end.abs());
+            Flown { interval, velocity, rounding: T::EPSILON * places / interval }
+        } else {
+            Flown { interval, velocity: Point::repeat(T::INFINITY), rounding: T::zero() }
+        }
     })
 }
 
 /// Largest speed over `speed_max`, less 1; 0 where none exceeds it. The node is that at the end of the interval.
 pub fn speed_excess<T: Real, const DIM: usize>(speed_max: T, times: &[T], path: &[Point<T, DIM>]) -> Worst<T> {
     let mut worst = Worst::none();
-    for (index, (_, velocity)) in velocities(times, path).enumerate() {
-        worst.raise(index + 1, norm(&velocity) / speed_max - T::one());
+    for (index, flown) in velocities(times, path).enumerate() {
+        worst.raise(index + 1, (norm(&flown.velocity) - flown.rounding) / speed_max - T::one());
     }
     worst
 }
@@ -55,13 +73,16 @@ pub fn accel_excess<T: Real, const DIM: usize>(
 ) -> Worst<T> {
     let mut worst = Worst::none();
     let velocities = velocities(times, path);
-    if let (Some(start), Some((interval, first))) = (approach.velocity, velocities.clone().next()) {
-        let mean = T::real(0.5) * (interval + approach.interval.unwrap_or(interval));
-        worst.raise(0, norm(&(first - start)) / mean / accel_max - T::one());
+    let half = T::real(0.5);
+    if let (Some(start), Some(first)) = (approach.velocity, velocities.clone().next()) {
+        let mean = half * (first.interval + approach.interval.unwrap_or(first.interval));
+        let change = norm(&(first.velocity - start)) - first.rounding;
+        worst.raise(0, change / mean / accel_max - T::one());
     }
-    for (index, ((before, from), (after, to))) in velocities.clone().zip(velocities.skip(1)).enumerate() {
-        let mean = T::real(0.5) * (before + after);
-        worst.raise(index + 1, norm(&(to - from)) / mean / accel_max - T::one());
+    for (index, (from, to)) in velocities.clone().zip(velocities.skip(1)).enumerate() {
+        let mean = half * (from.interval + to.interval);
+        let change = norm(&(to.velocity - from.velocity)) - from.rounding - to.rounding;
+        worst.raise(index + 1, change / mean / accel_max - T::one());
     }
     worst
 }

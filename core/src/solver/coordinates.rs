@@ -184,7 +184,7 @@ impl<T: Real, const DIM: usize> AgentFrame<T, DIM> {
 }
 
 /// Part of the time there is that a flight takes at least.
-const BRIEFEST: f64 = 1e-3;
+const BRIEFEST: f64 = 0.05;
 
 /// Shortest flight time where all agents are at their goals to begin with, s: any shorter one would be as good, down to none,
 /// and in no time nothing has a speed.

@@ -52,7 +52,7 @@ pub const VARIANTS_MAX: usize = 8;
 /// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
 const INFLATION_MAX: f64 = 1.25;
 /// Part of the time there is that a flight takes at least.
-const BRIEFEST: f64 = 2e-3;
+const BRIEFEST: f64 = 0.1;
 /// Fewest slices of a flight.
 const SLICES_MIN: usize = 2;
 /// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
