@@ -12,6 +12,7 @@ use super::workspace::{LATTICE_CELLS, LATTICE_PARENTS};
 // Empty memory is all zeros, and so is the number of the first variant: a static workspace takes no room in an image.
 #[derive(Clone, Debug)]
 #[repr(u8)]
+#[expect(clippy::large_enum_variant, reason = "there is no heap to put either on")]
 pub(super) enum Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
     Lattice(Tables<T, LATTICE_CELLS, LATTICE_PARENTS>),
     Refinement(Refinement<T, DIM, NODES, AGENTS>),
