@@ -61,6 +61,18 @@ fn every_equation_has_one_row_with_a_file_and_a_test_that_exist() {
 }
 
 #[test]
+fn every_failure_that_was_found_has_a_test_that_exists() {
+    let found = rows(&page("docs/hardening/README.md"), "| found by | what was wrong | test |");
+    assert!(found.len() > 10);
+    for row in found {
+        let [_, what, test] = row.as_slice() else { panic!("three cells: {row:?}") };
+        let tests = quoted(test);
+        let [path, function] = tests.as_slice() else { panic!("{what}: no test") };
+        assert!(page(path).contains(&format!("fn {function}()")), "{what}: no test {function} in {path}");
+    }
+}
+
+#[test]
 fn paths_and_pictures_on_the_pages_exist() {
     for name in
         ["README.md", "ARCHITECTURE.md", "DESIGN.md", "CONTRIBUTING.md", "docs/equations.md", "docs/bridge.md"]

@@ -233,6 +233,24 @@ fn acks_of_other_stations_lists_and_times_are_not_ours() {
     assert!(matches!(upload.result(), Some(Err(Failure::Rejected { .. }))));
 }
 
+/// An autopilot says so for an item of a transfer before this one that came twice or late.
+#[test]
+fn errors_about_another_transfer_end_nothing_and_one_that_is_meant_does() {
+    let error = frame(VEHICLE, acked(US, 0, MavMissionResult::MAV_MISSION_ERROR, 0));
+    let mut upload = Upload::new(talk(List::Mission), items(3), Pace::default());
+    upload.poll(Time::ZERO, &mut Vec::new());
+    for _ in 0..4 {
+        upload.handle(Time::ZERO, &error, &mut Vec::new());
+        assert_eq!(upload.result(), None);
+    }
+    upload.handle(Time::ZERO, &error, &mut Vec::new());
+    assert!(matches!(upload.result(), Some(Err(Failure::Rejected { .. }))), "{:?}", upload.result());
+    let mut download = Download::new(talk(List::Mission), Pace::default());
+    download.poll(Time::ZERO, &mut Vec::new());
+    download.handle(Time::ZERO, &error, &mut Vec::new());
+    assert!(download.result().is_none());
+}
+
 #[test]
 fn a_replaced_mission_is_noticed() {
     use quietpath_bridge::link::dialect::MISSION_CURRENT_DATA;

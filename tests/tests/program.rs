@@ -209,6 +209,27 @@ fn a_signal_holds_the_vehicle_silences_the_jammer_and_leaves_a_record_that_repla
     assert_eq!((status, vehicle.seen().levels.len()), (4, before.levels.len()), "{err}");
 }
 
+/// What the program says goes to a terminal that is gone: every write is an error, from the first word on.
+#[test]
+fn a_flight_goes_on_when_nobody_can_hear_the_program() {
+    let folder = Folder::new();
+    let port = free_port();
+    let vehicle = Vehicle::start(port, None);
+    let link = format!("udpin:127.0.0.1:{port}");
+    let path = |name: &str| folder.path(name);
+    let (scenario, plan, record, config) =
+        (path("scenario.toml"), path("plan.json"), path("flight.jsonl"), path("bridge.toml"));
+    let arguments = ["run", "--link", &link, "--scenario", &scenario, "--plan", &plan, "--mode", "guided"];
+    let mut command = bridge(&[&arguments[..], &["--record", &record, "--config", &config]].concat());
+    let gone = || std::io::pipe().expect("a pipe").1;
+    let child =
+        command.env("QUIETPATH_LOG", "trace").stdout(gone()).stderr(gone()).spawn().expect("the program runs");
+    vehicle.wait("the plan is flown", |seen| seen.setpoints > 60);
+    assert_eq!(terminate(child).0, 4, "as if it had been heard");
+    let (status, _, err) = run(&["replay", &record]);
+    assert_eq!(status, 0, "{err}");
+}
+
 #[test]
 fn a_signed_link_works_and_an_unsigned_one_says_why_not() {
     use std::os::unix::fs::PermissionsExt;

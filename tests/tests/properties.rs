@@ -68,9 +68,14 @@ fn frame(message: MavMessage) -> Frame {
     Frame { from: VEHICLE, sequence: 0, message, bytes: Vec::new() }
 }
 
-fn items(count: usize) -> Vec<Item> {
+fn items(list: List, count: usize) -> Vec<Item> {
+    let command = match list {
+        List::Mission => MavCmd::MAV_CMD_NAV_WAYPOINT,
+        List::Fence => MavCmd::MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+        List::Rally => MavCmd::MAV_CMD_NAV_RALLY_POINT,
+    };
     let item = |index: usize| Item {
-        command: MavCmd::MAV_CMD_NAV_WAYPOINT,
+        command,
         frame: MavFrame::MAV_FRAME_GLOBAL_RELATIVE_ALT,
         params: [0.0; 4],
         x: 473_977_420 + 137 * index as i32,
@@ -117,15 +122,20 @@ fn kind() -> impl Strategy<Value = Autopilot> {
     prop_oneof![Just(Autopilot::Px4), Just(Autopilot::ArduPilot)]
 }
 
-/// Delivers a mission; how that ended, if it did, and what the vehicle holds.
+fn list() -> impl Strategy<Value = List> {
+    prop::sample::select(List::ALL.to_vec())
+}
+
+/// Delivers a list; how that ended, if it did, and what the vehicle holds.
 fn deliver(
     kind: Autopilot,
+    list: List,
     count: usize,
     ways: (&mut Losses, &mut Losses),
 ) -> (Option<Result<Delivered, Failure>>, Vec<Item>) {
     let mut vehicle = Storage::new(kind, VEHICLE);
-    let talk = Talk { us: US, vehicle: VEHICLE, list: List::Mission };
-    let mut delivery = Delivery::new(talk, kind, items(count), Pace::default());
+    let talk = Talk { us: US, vehicle: VEHICLE, list };
+    let mut delivery = Delivery::new(talk, kind, items(list, count), Pace::default());
     converse(
         ways,
         |now, frame, out| {
@@ -142,14 +152,24 @@ fn deliver(
             None => vehicle.poll(now, out),
         },
     );
-    (delivery.result(), vehicle.lists[0].clone())
+    (delivery.result(), vehicle.lists[place(list)].clone())
 }
 
-/// Reads a mission; how that ended, if it did.
-fn download(kind: Autopilot, count: usize, ways: (&mut Losses, &mut Losses)) -> Option<Result<Vec<Item>, Failure>> {
+/// Where the vehicle keeps a list.
+fn place(list: List) -> usize {
+    List::ALL.iter().position(|other| *other == list).expect("one of them")
+}
+
+/// Reads a list; how that ended, if it did.
+fn download(
+    kind: Autopilot,
+    list: List,
+    count: usize,
+    ways: (&mut Losses, &mut Losses),
+) -> Option<Result<Vec<Item>, Failure>> {
     let mut vehicle = Storage::new(kind, VEHICLE);
-    vehicle.lists[0] = items(count);
-    let talk = Talk { us: US, vehicle: VEHICLE, list: List::Mission };
+    vehicle.lists[place(list)] = items(list, count);
+    let talk = Talk { us: US, vehicle: VEHICLE, list };
     let mut download = Download::new(talk, Pace::default());
     converse(
         ways,
@@ -174,32 +194,32 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn a_mission_arrives(
-        kind in kind(), count in 0..12_usize, mut up in losses(FAIR), mut down in losses(FAIR),
+    fn a_list_arrives(
+        kind in kind(), list in list(), count in 0..12_usize, mut up in losses(FAIR), mut down in losses(FAIR),
     ) {
-        let (result, held) = deliver(kind, count, (&mut up, &mut down));
+        let (result, held) = deliver(kind, list, count, (&mut up, &mut down));
         prop_assert!(result.is_some_and(|result| result.is_ok()), "{:?}", result);
-        prop_assert_eq!(first_difference(kind, true, &items(count), &held), None);
+        prop_assert_eq!(first_difference(kind, list == List::Mission, &items(list, count), &held), None);
     }
 
     #[test]
-    fn a_mission_is_read(
-        kind in kind(), count in 0..12_usize, mut up in losses(FAIR), mut down in losses(FAIR),
+    fn a_list_is_read(
+        kind in kind(), list in list(), count in 0..12_usize, mut up in losses(FAIR), mut down in losses(FAIR),
     ) {
-        let held = items(count);
-        prop_assert_eq!(download(kind, count, (&mut up, &mut down)), Some(Ok(held)));
+        let held = items(list, count);
+        prop_assert_eq!(download(kind, list, count, (&mut up, &mut down)), Some(Ok(held)));
     }
 
     #[test]
     fn transfers_end_and_claim_nothing_that_is_not_so(
-        kind in kind(), count in 0..12_usize, mut up in losses(UNFAIR), mut down in losses(UNFAIR),
+        kind in kind(), list in list(), count in 0..12_usize, mut up in losses(UNFAIR), mut down in losses(UNFAIR),
     ) {
-        let (result, held) = deliver(kind, count, (&mut up, &mut down));
+        let (result, held) = deliver(kind, list, count, (&mut up, &mut down));
         prop_assert!(result.is_some(), "it goes on and on");
-        let difference = first_difference(kind, true, &items(count), &held);
+        let difference = first_difference(kind, list == List::Mission, &items(list, count), &held);
         prop_assert!(result.is_some_and(|result| result.is_err()) || difference.is_none(), "{:?}", difference);
-        let read = download(kind, count, (&mut up, &mut down));
-        prop_assert!(read.is_some_and(|read| read.is_err() || read == Ok(items(count))), "another mission");
+        let read = download(kind, list, count, (&mut up, &mut down));
+        prop_assert!(read.is_some_and(|read| read.is_err() || read == Ok(items(list, count))), "another mission");
     }
 
     /// A command is sent four times.
