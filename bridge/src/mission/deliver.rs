@@ -57,7 +57,8 @@ impl Delivery {
         self.result
     }
 
-    /// Whether the autopilot said that it took the list, which is not proved yet.
+    /// Whether the autopilot said that it took the list, or holds one as long after it asked for all of it, which is not proved
+    /// yet. Its ACK may be lost, and a vehicle in flight is not to wait for the proof.
     #[must_use]
     pub const fn is_accepted(&self) -> bool {
         self.is_accepted
@@ -121,7 +122,10 @@ impl Delivery {
                 }
             },
             Step::ReadBack(download) => match download.result() {
-                None => {}
+                None => {
+                    let is_as_long = download.count().is_some_and(|count| usize::from(count) == self.items.len());
+                    self.is_accepted |= is_as_long;
+                }
                 Some(Ok(kept)) => {
                     let is_mission = self.talk.list == List::Mission;
                     match first_difference(self.autopilot, is_mission, &self.items, kept) {

@@ -44,6 +44,12 @@ impl Download {
         self.result.map(|result| result.map(|()| self.items.as_slice()))
     }
 
+    /// How many items the autopilot says that it holds, once it has.
+    #[must_use]
+    pub const fn count(&self) -> Option<u16> {
+        self.count
+    }
+
     /// The id that the autopilot gives the list, 0 where it gives none.
     #[must_use]
     pub const fn opaque_id(&self) -> u32 {

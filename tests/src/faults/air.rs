@@ -34,7 +34,7 @@ const NEAR: f64 = 5.0;
 /// Centre and radius of the region, length units.
 const REGION: ([f64; 2], f64) = ([10.0, 9.0], 2.0);
 /// Part of the radius that is not flown into: a vehicle that follows a mission cuts corners.
-const CORNERS: f64 = 0.93;
+const CORNERS: f64 = 0.95;
 /// Side of the domain, length units.
 const SIDE: f64 = 20.0;
 /// Largest speed, length units a second.
