@@ -73,7 +73,10 @@ pub fn run(request: &Request) -> std::io::Result<()> {
     let opening = machine::described();
     let mut references = references();
     let mut rows = Vec::new();
-    for name in names().into_iter().filter(|name| name.contains(&request.only)) {
+    let mut names: Vec<String> = names().into_iter().filter(|name| name.contains(&request.only)).collect();
+    // The largest last: where a peer takes for ever on it, the page has the rest.
+    names.sort_by_key(|name| crate::scenario(name).agents.len());
+    for name in names {
         let row = measure(&name, references.remove(&name), &mut peers, request.turns);
         println!("{}", line(&row));
         rows.push(row);
