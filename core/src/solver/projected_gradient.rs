@@ -340,7 +340,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Descent<'_, T, DIM, AGENTS>
         let direct = largest_share(self.frame, domain, iterate, candidate, iterate.pace);
         let mut kept = T::one();
         if direct < T::one() {
-            let around = largest_share(self.frame, domain, anchor, candidate, iterate.pace);
+            // Straight lines bend nowhere; another anchor keeps the bound on bends where it is the tangent to it.
+            let is_straight = self.scenario.agents.iter().all(|agent| agent.start_velocity.is_none());
+            let center = if is_straight { iterate.pace } else { anchor.pace };
+            let around = largest_share(self.frame, domain, anchor, candidate, center);
             let (from, share) = if around > T::real(0.9) { (&*anchor, around) } else { (&*iterate, direct) };
             kept = share;
             next.between(from, candidate, share, self.frame);
