@@ -1,4 +1,4 @@
-//! Tests under Miri and under sanitizers, and pages of what came of them.
+//! Tests under Miri, and the page of what came of them.
 //!
 //! They find what a test that passes does not show: undefined behaviour in what the core is built on, memory errors and
 //! races in the bridge and its dependencies. Our own crates have no unsafe code. All of it needs a nightly toolchain:
@@ -23,8 +23,6 @@ const UNDER_MIRI: [(&str, &str); 2] = [
 ];
 /// Miri reads no assembly, which libm has where a processor computes a function itself, to the same bit.
 const PLAIN: &str = "--features libm/force-soft-floats";
-/// The target that sanitizers are built for: with one, build scripts are left out.
-const HOST: &str = "x86_64-unknown-linux-gnu";
 
 /// Tests that run under a watch.
 struct Watch {
@@ -74,34 +72,13 @@ pub fn miri(top: &Path) -> anyhow::Result<bool> {
     all(&watches, "Miri", "miri", top)
 }
 
-/// The bridge's tests under sanitizers; writes `docs/hardening/sanitizers.md`.
-///
-/// # Errors
-/// A program that cannot be started, or a page that cannot be written.
-pub fn sanitize(top: &Path) -> anyhow::Result<bool> {
-    // Locks of the standard library are seen only where it is built in the same way.
-    let watch = |what, name: &str, std: &str| Watch {
-        what,
-        arguments: format!(
-            "test {std}--package quietpath-bridge --tests --no-fail-fast --target {HOST} --target-dir target/sanitize/{name}"
-        ),
-        environment: vec![("RUSTFLAGS", format!("-Zsanitizer={name}"))],
-    };
-    let watches = [
-        watch("the bridge, its memory watched", "address", ""),
-        watch("the bridge, its threads watched", "thread", "-Zbuild-std "),
-    ];
-    all(&watches, "Sanitizers", "sanitizers", top)
-}
-
 fn all(watches: &[Watch], title: &str, page_name: &str, top: &Path) -> anyhow::Result<bool> {
     let mut found = Vec::new();
     for (index, watch) in watches.iter().enumerate() {
         println!("[{}/{}] {}", index + 1, watches.len(), watch.what);
         found.push(run(watch, top)?);
     }
-    let command = if page_name == "miri" { "cargo xtask miri" } else { "cargo xtask sanitize" };
-    let page = page(title, command, &made(top)?, &found);
+    let page = page(title, "cargo xtask miri", &made(top)?, &found);
     print!("{page}");
     let place = top.join("docs/hardening").join(page_name).with_extension("md");
     std::fs::write(&place, page).with_context(|| format!("cannot write {}", place.display()))?;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use fastrand::Rng;
 use quietpath_abuse::TARGETS;
+use quietpath_abuse::problem::{Verdict, numbered, of_kind};
 
 /// Neighbours of each seed that are tried.
 const NEIGHBOURS: u64 = 4;
@@ -83,6 +84,18 @@ fn machines_keep_their_promises() {
 #[test]
 fn problems_keep_their_promises() {
     keeps("problem");
+}
+
+/// Problems of `cargo xtask numbers` whose plans broke a promise: no way to go, a used workspace, a node at the edge of a window,
+/// rounding, an anchor that bends.
+#[test]
+fn numbered_problems_that_were_found_keep_their_promises() {
+    for index in [4, 5, 14, 15, 31, 54, 66, 67, 317, 321, 1528] {
+        let (kind, mut draws) = numbered(8, index);
+        let verdict =
+            draws.find_map(|bytes| Some(of_kind(kind, &bytes)).filter(|found| *found != Ok(Verdict::Refused)));
+        assert!(matches!(verdict, Some(Ok(_))), "problem {index}: {verdict:?}");
+    }
 }
 
 #[test]

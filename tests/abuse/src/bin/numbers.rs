@@ -14,11 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use clap::Parser;
-use fastrand::Rng;
-use quietpath_abuse::problem::{Broken, KINDS, Verdict, of_kind};
+use quietpath_abuse::problem::{Broken, KINDS, Verdict, numbered, of_kind};
 
-/// Bytes that a problem is drawn from: more than it takes.
-const BYTES: usize = 2048;
 /// Problems that are drawn at most for one that is planned.
 const DRAWS_MAX: u64 = 1000;
 
@@ -57,11 +54,8 @@ struct Tally {
 
 /// Plans problem `index` of a sequence; which kind it is, what came of it, and how many were drawn before it that are none.
 fn attempt(seed: u64, index: u64) -> (usize, Result<Verdict, Broken>, u64) {
-    let kind = usize::try_from(index % 4).unwrap_or_default();
-    // Neighbouring seeds must not give neighbouring sequences.
-    let mut random = Rng::with_seed((seed << 32) ^ (index / 4).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    for refused in 0..DRAWS_MAX {
-        let bytes: Vec<u8> = (0..BYTES).map(|_| random.u8(..)).collect();
+    let (kind, draws) = numbered(seed, index);
+    for (refused, bytes) in (0..DRAWS_MAX).zip(draws) {
         // A panic is a broken promise like any other.
         let verdict = catch_unwind(AssertUnwindSafe(|| of_kind(kind, &bytes)));
         let verdict = verdict.unwrap_or_else(|panic| Err(Broken(format!("panics: {}", said(&*panic)))));

@@ -9,6 +9,7 @@ mod judge;
 pub use draw::{AGENTS, KNOTS, NODES, Problem, SENSORS};
 pub use judge::{Broken, Verdict, judge, roll};
 
+use fastrand::Rng;
 use quietpath_core::Real;
 use quietpath_core::solver::Settings;
 
@@ -16,6 +17,18 @@ use crate::dice::{Dice, Mood};
 
 /// Precisions and dimensions, by [kind](of_kind).
 pub const KINDS: [&str; 4] = ["f64, 2-D", "f32, 2-D", "f64, 3-D", "f32, 3-D"];
+
+/// Bytes that a problem is drawn from: more than it takes.
+const BYTES: usize = 2048;
+
+/// Problem `index` of the sequence that `seed` begins: its kind, and bytes for it, one draw after the other, of which the first
+/// that is no [`Verdict::Refused`] counts.
+pub fn numbered(seed: u64, index: u64) -> (usize, impl Iterator<Item = Vec<u8>>) {
+    let kind = usize::try_from(index % 4).unwrap_or_default();
+    // Neighbouring seeds must not give neighbouring sequences.
+    let mut random = Rng::with_seed((seed << 32) ^ (index / 4).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    (kind, std::iter::repeat_with(move || (0..BYTES).map(|_| random.u8(..)).collect()))
+}
 
 /// Plans a problem of some bytes that makes sense with default settings, in one of [`KINDS`], and judges the plan. It is
 /// compiled here, where planning is compiled already.
