@@ -3,6 +3,7 @@
 use quietpath_bridge::file::PlanFile;
 use quietpath_bridge::planning::{Assessment, Options, Planned, Precision, Rollout, Status, assess, plan};
 use quietpath_tests::figures::references;
+use quietpath_tests::instances::instance;
 use quietpath_tests::scenario;
 
 /// Scenarios that are planned as well as the best known plans.
@@ -92,4 +93,13 @@ fn single_precision_plans_nearly_as_well() {
         assert!(single.feasible, "{name}: {:?}", single.worst);
         assert!(gap <= 1e-3, "{name}: {} in f32, {} in f64", single.objective, double.objective);
     }
+}
+
+/// A limit closes every way that is in time: late ones are looked at, as far as it takes.
+#[test]
+fn a_late_way_is_found_where_there_is_none_in_time() {
+    let scenario = instance(2, 60).scenario();
+    let planned = plan(&scenario, &Options::default()).expect("planned");
+    assert!(planned.assessment.feasible, "{:?}", planned.status);
+    assert!(planned.plan.duration > scenario.time.target, "there is no way in time");
 }

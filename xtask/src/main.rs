@@ -7,8 +7,8 @@
 mod count;
 mod firmware;
 mod fuzz;
+mod miri;
 mod step;
-mod watched;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -141,7 +141,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Count { scenario, profile } => return count::count(scenario, *profile, top),
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count, checked, threads } => numbers(*count, *checked, *threads),
-        Command::Miri => return watched::miri(top),
+        Command::Miri => return miri::miri(top),
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
         Command::Deny => deny(top)?,
         Command::Check => check(),

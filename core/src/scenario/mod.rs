@@ -36,7 +36,7 @@ use sensor::track_state;
 use heapless::Vec;
 
 use crate::error::{Error, Fault, Item};
-use crate::math::{Point, Real};
+use crate::math::{Point, Real, norm};
 
 /// Objective terms that a scenario can hold.
 pub const TERMS_MAX: usize = 8;
@@ -44,6 +44,8 @@ pub const TERMS_MAX: usize = 8;
 pub const REGIONS_MAX: usize = 16;
 /// Limits that a scenario can hold.
 pub const LIMITS_MAX: usize = 8;
+/// Part of the time there is that a flight to where it begins takes at least.
+const BRIEFEST: f64 = 0.05;
 
 /// Where the sensors linearise their measurements: r0 of (12).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -290,6 +292,15 @@ impl<'a, T: Real, const DIM: usize> View<'a, T, DIM> {
     #[must_use]
     pub const fn with_sensors(self, sensors: &'a [StoredSensor<T, DIM>]) -> Self {
         Self { sensors, ..self }
+    }
+
+    /// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4. Where nobody has anywhere to go, a
+    /// little of the time there is: any shorter flight would be as good, down to none, and in no time nothing has a speed.
+    pub(crate) fn shortest_flight(&self) -> T {
+        let times = self.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
+        let shortest = times.fold(T::zero(), T::max);
+        let frame = self.frame;
+        if shortest > T::zero() { shortest } else { (frame.time.max - frame.start_time) * T::real(BRIEFEST) }
     }
 
     /// Position (length units) and velocity (length units per s) of a sensor at `time` (s).

@@ -183,15 +183,6 @@ impl<T: Real, const DIM: usize> AgentFrame<T, DIM> {
     }
 }
 
-/// Part of the time there is that a flight takes at least.
-const BRIEFEST: f64 = 0.05;
-
-/// Shortest flight time where all agents are at their goals to begin with, s: any shorter one would be as good, down to none,
-/// and in no time nothing has a speed.
-pub(super) fn briefest_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
-    (scenario.frame.time.max - scenario.frame.start_time) * T::real(BRIEFEST)
-}
-
 /// The map between iterates and trajectories of one scenario.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame<T, const DIM: usize, const AGENTS: usize> {
@@ -262,7 +253,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Frame<T, DIM, AGENTS> {
             frame.agent().map(|a| norm_squared(&a.reach) / count).fold(T::zero(), |sum, part| sum + part);
         frame.inertia = stretch + count * T::from_count(agents.max(1));
         if frame.agent().all(|agent| norm_squared(&agent.line) == T::zero()) {
-            frame.pace_max = Some(duration / briefest_duration(scenario));
+            frame.pace_max = Some(duration / scenario.shortest_flight());
         }
         frame
     }

@@ -7,13 +7,13 @@
 
 use crate::constraints;
 use crate::error::{Error, Fault, Item};
-use crate::math::{Real, norm};
+use crate::math::Real;
 use crate::metrics::Sample;
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
 use crate::warm_start::azimuth_of_nearest;
 
-use super::coordinates::{Frame, briefest_duration};
+use super::coordinates::Frame;
 use super::projection::Request;
 use super::{Settings, Workspace};
 
@@ -36,19 +36,12 @@ pub enum Start<'a, T, const DIM: usize, const NODES: usize, const AGENTS: usize>
     Given(&'a Trajectory<T, DIM, NODES, AGENTS>),
 }
 
-/// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4. Where nobody has anywhere to go, a
-/// little of the time there is, so that there is a flight.
-pub(super) fn shortest_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
-    let times = scenario.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
-    times.fold(briefest_duration(scenario), T::max)
-}
-
 /// Whether the time there is is the shortest flight time itself: then the straight line is all there is, and the
 /// feasible set has no interior to search.
 pub(super) fn is_straight_only<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> bool {
     let allowed = scenario.frame.time.max - scenario.frame.start_time;
     let has_free_start = scenario.agents.iter().all(|agent| agent.start_velocity.is_none());
-    let slack = allowed - shortest_duration(scenario);
+    let slack = allowed - scenario.shortest_flight();
     has_free_start && slack <= allowed * T::EPSILON * T::real(16.0) || scenario.frame.intervals < 2
 }
 
@@ -57,7 +50,7 @@ pub(super) fn is_straight_only<T: Real, const DIM: usize>(scenario: &View<'_, T,
 fn first_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
     let frame = &scenario.frame;
     let allowed = frame.time.max - frame.start_time;
-    let shortest = shortest_duration(scenario);
+    let shortest = scenario.shortest_flight();
     let wanted = if frame.time.penalty > T::zero() && frame.time.target > frame.start_time {
         frame.time.target - frame.start_time
     } else {
@@ -104,7 +97,7 @@ where
         lay_controls(scenario, &mut workspace.best);
         return Ok(());
     }
-    let shortest = shortest_duration(scenario).max(first * T::real(0.1));
+    let shortest = scenario.shortest_flight().max(first * T::real(0.1));
     for stretch in STRETCHES {
         let duration = (shortest * T::real(stretch)).min(allowed);
         workspace.trial = Trajectory::straight(scenario, duration)?;

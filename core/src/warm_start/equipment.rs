@@ -17,7 +17,7 @@
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real, norm_squared};
 use crate::metrics::Sample;
-use crate::scenario::{BeamPattern, View};
+use crate::scenario::{Agent, BeamPattern, View};
 use crate::trajectory::{Track, Trajectory};
 
 use super::Tables;
@@ -110,12 +110,7 @@ pub(crate) fn equip_elsewhere<
 where
     T: Real,
 {
-    let Some(equipped) = scenario.agents.get(agent) else { return false };
-    let budget = match level {
-        Level::Jam => equipped.jammer.map(|jammer| jammer.budget),
-        Level::Dropout => equipped.dropout.map(|dropout| dropout.budget),
-    };
-    let Some(budget) = budget else { return false };
+    let Some(budget) = scenario.agents.get(agent).and_then(|agent| level.budget(agent)) else { return false };
     lay(scenario, trajectory, (agent, level), (budget, Where::Elsewhere), tables, scratch);
     true
 }
@@ -138,6 +133,14 @@ enum Where {
 
 impl Level {
     pub(crate) const ALL: [Self; 2] = [Self::Jam, Self::Dropout];
+
+    /// Seconds at level 1 that an agent has, where it has this level.
+    fn budget<T: Real, const DIM: usize>(self, agent: &Agent<T, DIM>) -> Option<T> {
+        match self {
+            Self::Jam => agent.jammer.map(|jammer| jammer.budget),
+            Self::Dropout => agent.dropout.map(|dropout| dropout.budget),
+        }
+    }
 
     fn of<T, const DIM: usize, const NODES: usize>(self, track: &mut Track<T, DIM, NODES>) -> &mut [T; NODES] {
         match self {

@@ -51,8 +51,6 @@ pub use obstruction::{Blocked, Obstruction};
 pub const VARIANTS_MAX: usize = 8;
 /// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
 const INFLATION_MAX: f64 = 1.25;
-/// Part of the time there is that a flight takes at least.
-const BRIEFEST: f64 = 0.1;
 /// Fewest slices of a flight.
 const SLICES_MIN: usize = 2;
 /// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
@@ -135,12 +133,10 @@ struct Plan<T, const DIM: usize> {
 pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<Variant<T>, VARIANTS_MAX> {
     let frame = &scenario.frame;
     let allowed = frame.time.max - frame.start_time;
-    let times = scenario.agents.iter().map(|agent| norm(&(agent.goal - agent.start)) / agent.speed_max);
-    let shortest = times.fold(T::zero(), T::max);
     let target = frame.time.target - frame.start_time;
     let is_urged = frame.time.penalty > T::zero();
     // With a penalty the best arrival is near the target, before or after it; without, anywhere up to the end.
-    let least = (shortest * T::real(1.02)).max(allowed * T::real(BRIEFEST)).min(allowed);
+    let least = (scenario.shortest_flight() * T::real(1.02)).min(allowed);
     let most = if is_urged { target.max(least).min(allowed) } else { allowed };
     let at = |share: f64| least + (most - least) * T::real(share);
     let late = |part: f64| (most * T::real(1.0 + part)).min(allowed);

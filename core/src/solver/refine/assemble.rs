@@ -9,16 +9,16 @@ use heapless::Vec;
 
 use crate::jet::Jet;
 use crate::math::{Point, Real, norm_squared};
-use crate::metrics::{Needs, Sample, Values, Variables};
-use crate::objective::curvature::{Integrals, Slope, Slopes, Weigh, node_curvature};
-use crate::objective::merit::slacks;
-use crate::scenario::{Domain, Metric, ReferencePoint, View};
+use crate::metrics::{Sample, Variables};
+use crate::objective::curvature::{Integrals, Single, node_curvature};
+use crate::scenario::{Domain, ReferencePoint, View};
 use crate::solver::controls::{Bound, KINDS, Kind};
 use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
 use crate::trajectory::Trajectory;
 
 use super::barrier::{Multipliers, for_each_wall};
 use super::extremes::Extremes;
+use super::limits::Limits;
 use super::rows::{Ball, for_each_ball, index};
 use super::system::{BUDGETS, COLUMNS, EXTREMES, PACE, System};
 
@@ -193,7 +193,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             place.add(&jet, T::one(), Share::Node, system);
         }
         for worst in self.extremes.of(agent).filter(|worst| worst.term.window.holds(time)) {
-            let own = Own { agent, metric: worst.term.metric };
+            let own = Single { agent, metric: worst.term.metric };
             let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &own, scratch);
             let sign = worst.sign();
             let slack = worst.value - sign * jet.value;
@@ -517,59 +517,6 @@ fn add_to_part<T: Real, const DIM: usize, const NODES: usize>(
     };
     if let Some(entry) = entry {
         *entry += value;
-    }
-}
-
-/// Barriers of the limits: psi = -mu ln g.
-struct Limits<'a, T, const DIM: usize> {
-    scenario: &'a View<'a, T, DIM>,
-    barrier: T,
-}
-
-impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
-    fn needs(&self, _: usize) -> Needs {
-        let mut needs = Needs::default();
-        self.scenario.limits.iter().for_each(|limit| needs.add(limit.metric));
-        needs
-    }
-
-    fn slopes(&self, _: usize, values: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
-        for limit in self.scenario.limits {
-            let Some(value) = values.get(limit.metric) else { continue };
-            let (mut first, mut second) = (T::zero(), T::zero());
-            for (slack, by_value) in slacks(limit, value).into_iter().flatten() {
-                let push = self.barrier / slack;
-                first -= push * by_value;
-                second += push / slack * by_value * by_value;
-            }
-            let _ = slopes.push(Slope { metric: limit.metric, first, second });
-        }
-        slopes
-    }
-}
-
-/// One agent's own metric, as it is.
-struct Own {
-    agent: usize,
-    metric: Metric,
-}
-
-impl<T: Real> Weigh<T> for Own {
-    fn needs(&self, agent: usize) -> Needs {
-        let mut needs = Needs::default();
-        if agent == self.agent {
-            needs.add(self.metric);
-        }
-        needs
-    }
-
-    fn slopes(&self, agent: usize, _: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
-        if agent == self.agent {
-            let _ = slopes.push(Slope { metric: self.metric, first: T::one(), second: T::zero() });
-        }
-        slopes
     }
 }
 

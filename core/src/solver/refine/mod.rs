@@ -18,6 +18,7 @@ mod assemble;
 mod barrier;
 mod block;
 mod extremes;
+mod limits;
 mod rows;
 mod system;
 

@@ -1,8 +1,7 @@
 //! Tests under Miri, and the page of what came of them.
 //!
-//! They find what a test that passes does not show: undefined behaviour in what the core is built on, memory errors and
-//! races in the bridge and its dependencies. Our own crates have no unsafe code. All of it needs a nightly toolchain:
-//! `rustup toolchain install nightly --component miri,rust-src`.
+//! It finds what a test that passes does not show: undefined behaviour in what the core is built on. Our own crates have no
+//! unsafe code. It needs a nightly toolchain: `rustup toolchain install nightly --component miri,rust-src`.
 
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader};
@@ -69,18 +68,14 @@ pub fn miri(top: &Path) -> anyhow::Result<bool> {
         watch("scenarios, paths and constraints, debug assertions off", "false", whole),
         watch("units of the core, debug assertions off", "false", units),
     ];
-    all(&watches, "Miri", "miri", top)
-}
-
-fn all(watches: &[Watch], title: &str, page_name: &str, top: &Path) -> anyhow::Result<bool> {
     let mut found = Vec::new();
     for (index, watch) in watches.iter().enumerate() {
         println!("[{}/{}] {}", index + 1, watches.len(), watch.what);
         found.push(run(watch, top)?);
     }
-    let page = page(title, "cargo xtask miri", &made(top)?, &found);
+    let page = page(&made(top)?, &found);
     print!("{page}");
-    let place = top.join("docs/hardening").join(page_name).with_extension("md");
+    let place = top.join("docs/hardening/miri.md");
     std::fs::write(&place, page).with_context(|| format!("cannot write {}", place.display()))?;
     println!("written to {}", place.display());
     Ok(found.iter().all(|watched| watched.good))
@@ -139,9 +134,9 @@ pub fn made(top: &Path) -> anyhow::Result<String> {
     Ok(format!("on {date}, of {commit}, by {compiler}"))
 }
 
-fn page(title: &str, command: &str, made: &str, found: &[Watched]) -> String {
+fn page(made: &str, found: &[Watched]) -> String {
     let mut out = format!(
-        "# {title}\n\nWritten by `{command}` {made}.\n\n\
+        "# Miri\n\nWritten by `cargo xtask miri` {made}.\n\n\
          | tests | passed | failed | ignored | seconds, built too | result |\n|---|---|---|---|---|---|\n"
     );
     for Watched { what, counts: Counts { passed, failed, ignored }, seconds, good, .. } in found {
@@ -172,7 +167,7 @@ mod tests {
         }
         assert_eq!(counts, Counts { passed: 13, failed: 2, ignored: 3 });
         let watched = |good| Watched { what: "the core", shown: "cargo".into(), counts, seconds: 5, good };
-        let page = page("Miri", "cargo xtask miri", "today", &[watched(true), watched(false)]);
+        let page = page("today", &[watched(true), watched(false)]);
         assert!(page.contains("| the core | 13 | 2 | 3 | 5 | nothing found |"), "{page}");
         assert!(page.contains("| 5 | FOUND SOMETHING |"), "{page}");
     }
