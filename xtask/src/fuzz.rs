@@ -49,7 +49,7 @@ pub fn fuzz(seconds: u64, only: Option<&str>, top: &Path) -> anyhow::Result<bool
         println!("[{}/{}] {target}, {seconds} s", index + 1, targets.len());
         runs.push(run(target, seconds, top)?);
     }
-    let page = page(&runs, seconds, &crate::miri::made(top)?);
+    let page = page(&runs, seconds, &crate::watch::made(top)?);
     print!("{page}");
     if only.is_none() {
         let place = top.join("docs/hardening/fuzz.md");

@@ -1,5 +1,5 @@
 //! The developer loop: `cargo xtask check`, `test`, `target`, `header`, `instructions`, `sizes`, `ci`, `pictures`,
-//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `miri`, `deny`.
+//! `gallery`, `bench`, `live`, `count`, `fuzz`, `faults`, `numbers`, `miri`, `sanitize`, `deny`.
 //!
 //! Every command is a list of steps. A step is a program run from the top of the repository with its output passed
 //! through; the first that fails ends the run, and a summary says what ran, how long it took, and what did not run.
@@ -8,7 +8,9 @@ mod count;
 mod firmware;
 mod fuzz;
 mod miri;
+mod sanitize;
 mod step;
+mod watch;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -101,6 +103,9 @@ enum Command {
     },
     /// The core's tests under Miri, a selection; writes docs/hardening/miri.md. Needs a nightly toolchain with Miri
     Miri,
+    /// The bridge's tests under sanitizers of addresses and threads; writes docs/hardening/sanitizers.md. Needs a nightly
+    /// toolchain with rust-src
+    Sanitize,
     /// Licences, sources and duplicates of all dependencies, and withdrawn versions. Needs cargo-deny and cargo-audit
     Deny,
     /// Flies the bridge against the simulated autopilot, and writes docs/live.md: latency, load, endurance; takes six minutes
@@ -142,6 +147,7 @@ fn run(command: &Command) -> anyhow::Result<bool> {
         Command::Fuzz { seconds, only } => return fuzz::fuzz(*seconds, only.as_deref(), top),
         Command::Numbers { count, checked, threads } => numbers(*count, *checked, *threads),
         Command::Miri => return miri::miri(top),
+        Command::Sanitize => return sanitize::sanitize(top),
         Command::Faults { seeds, programs } => faults(*seeds, *programs),
         Command::Deny => deny(top)?,
         Command::Check => check(),

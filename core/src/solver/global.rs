@@ -15,7 +15,7 @@ use super::coordinates::Frame;
 use super::feasible::largest_share;
 use super::projection::Request;
 use super::race::{EQUIPS_MAX, Race, equip, equip_anew, has_equipment};
-use super::{Ledger, Obstacle, Settings, Status, Workspace, projected_gradient};
+use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, projected_gradient};
 
 /// Candidates that are polished at most, of all that are laid.
 pub(super) const CANDIDATES_MAX: usize = 8;
@@ -52,7 +52,12 @@ where
     if has_equipment(scenario) {
         workspace.trial.assign(&workspace.best);
         equip(scenario, workspace, &mut prices);
-        workspace.best.assign(&workspace.trial);
+        // What is laid may break a limit that a line without it keeps.
+        let before = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch);
+        let after = guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch);
+        if after > T::zero() || before <= T::zero() {
+            workspace.best.assign(&workspace.trial);
+        }
     }
     workspace.base.assign(&workspace.best);
     let mut race = Race::new(scenario, settings);

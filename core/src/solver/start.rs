@@ -2,8 +2,8 @@
 //!
 //! Without start velocities the straight line at constant speed is feasible whenever the goal can be reached, and
 //! strictly so for any flight time longer than the shortest. With them, the straight line is projected on the
-//! bounds at one flight time after another until a feasible path comes out. Regions, separations and limits do not count
-//! here: the planner leads a start that is not clear of them to where it is.
+//! bounds at one flight time after another until a feasible path comes out. A straight line that is not clear of regions,
+//! separations and limits is tried at other flight times; one that is at none, or bends, is led clear by the planner.
 
 use crate::constraints;
 use crate::error::{Error, Fault, Item};
@@ -15,10 +15,15 @@ use crate::warm_start::azimuth_of_nearest;
 
 use super::coordinates::Frame;
 use super::projection::Request;
-use super::{Settings, Workspace};
+use super::{Settings, Workspace, guard};
 
 /// Flight times tried, as multiples of the shortest, until a path that follows the start velocity is found.
 const STRETCHES: [f64; 6] = [1.05, 1.2, 1.5, 2.0, 3.0, 5.0];
+
+/// The first flight time where none is wanted, as a multiple of the shortest.
+const USUAL: f64 = 1.3;
+/// Flight times, evenly up to the longest, that are tried where what is in the way of a straight line may pass.
+const TIMES: usize = 8;
 
 /// Part of a budget that the first controls use, and the largest first level.
 const FIRST_SHARE: f64 = 0.5;
@@ -54,7 +59,7 @@ fn first_duration<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> T {
     let wanted = if frame.time.penalty > T::zero() && frame.time.target > frame.start_time {
         frame.time.target - frame.start_time
     } else {
-        shortest * T::real(1.3)
+        shortest * T::real(USUAL)
     };
     let least = shortest * T::real(1.05);
     if wanted.max(least) < allowed { wanted.max(least) } else { (shortest + allowed) * T::real(0.5) }
@@ -95,6 +100,9 @@ where
     if !has_velocity {
         workspace.best = Trajectory::straight(scenario, first)?;
         lay_controls(scenario, &mut workspace.best);
+        if guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) <= T::zero() {
+            avoid_by_time(scenario, workspace)?;
+        }
         return Ok(());
     }
     let shortest = scenario.shortest_flight().max(first * T::real(0.1));
@@ -109,6 +117,29 @@ where
     }
     let agent = scenario.agents.iter().position(|agent| agent.start_velocity.is_some()).unwrap_or_default();
     Err(Error::new(Item::Agent(agent), "start_velocity", Fault::StartVelocity))
+}
+
+/// Replaces `workspace.best` by the first straight line, without jamming or dropout, that regions and limits are clear of
+/// at one of [`TIMES`] flight times; leaves it where there is none.
+///
+/// The planner would lead it out of their way too, but has no plan until it has, and a deadline may come first.
+fn avoid_by_time<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+) -> Result<(), Error> {
+    let allowed = scenario.frame.time.max - scenario.frame.start_time;
+    let shortest = scenario.shortest_flight();
+    let usual = (shortest * T::real(USUAL)).min(allowed);
+    let between =
+        (0..TIMES).map(|time| shortest + (allowed - shortest) * (T::from_count(time + 1) / T::from_count(TIMES)));
+    for duration in core::iter::once(usual).chain(between) {
+        workspace.trial = Trajectory::straight(scenario, duration)?;
+        if guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch) > T::zero() {
+            workspace.best.assign(&workspace.trial);
+            break;
+        }
+    }
+    Ok(())
 }
 
 /// The largest violation of what the projection knows: everything but regions, separations and limits.
