@@ -115,12 +115,23 @@ pub fn node_values<T: Real, const DIM: usize, const NODES: usize, const AGENTS: 
     node: usize,
     scratch: &mut [Sample<T, DIM>],
 ) -> Values<T> {
+    needed_values(scenario, trajectory, (agent, node), Needs::ALL, scratch)
+}
+
+/// What [`node_values`] is, for the metrics that `needs` names; others are 0 or `None`.
+pub(crate) fn needed_values<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    (agent, node): (usize, usize),
+    needs: Needs,
+    scratch: &mut [Sample<T, DIM>],
+) -> Values<T> {
     let Some(situation) = situation(scenario, trajectory, agent, node) else {
         let nothing = T::real(f64::NAN);
         return Values { detection: nothing, false_alarm: nothing, location: None };
     };
     let emitters = emitters(scenario, trajectory, node);
-    forward(scenario, &situation, &emitters, Needs::ALL, scratch).values
+    forward(scenario, &situation, &emitters, needs, scratch).values
 }
 
 /// All figures of an agent that stands at `position` (length units) at `time` (s): no jamming, no dropout, and

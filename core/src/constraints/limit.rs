@@ -4,8 +4,9 @@
 
 use crate::constraints::{Worst, raise};
 use crate::math::Real;
+use crate::metrics::Needs;
 use crate::metrics::Sample;
-use crate::objective::node_values;
+use crate::objective::needed_values;
 use crate::scenario::{LIMITS_MAX, Limit, View};
 use crate::trajectory::Trajectory;
 
@@ -21,8 +22,9 @@ pub fn excess<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize
     if scenario.limits.is_empty() {
         return worst;
     }
+    let needs = Needs::of(scenario.limits.iter().map(|limit| limit.metric));
     for node in 1..trajectory.nodes() {
-        let values = node_values(scenario, trajectory, agent, node, scratch);
+        let values = needed_values(scenario, trajectory, (agent, node), needs, scratch);
         for (limit, worst) in scenario.limits.iter().zip(&mut worst) {
             if let Some(value) = values.get(limit.metric) {
                 worst.raise(node, outside(limit, value) / scale(limit));

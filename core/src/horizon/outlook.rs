@@ -1,8 +1,8 @@
 //! What the world looked like along a plan, to be compared with what it looks like later.
 
 use crate::math::Real;
-use crate::metrics::Sample;
-use crate::objective::node_values;
+use crate::metrics::{Needs, Sample};
+use crate::objective::needed_values;
 use crate::scenario::{Sense, View};
 use crate::trajectory::{Trajectory, shift};
 
@@ -80,8 +80,9 @@ fn density<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
 ) -> T {
     let time = plan.times.get(node).copied().unwrap_or_default();
     let weight = scenario.agents.get(agent).map_or(T::zero(), |agent| agent.weight);
-    let values = node_values(scenario, plan, agent, node, scratch);
     let terms = scenario.terms.iter().filter(|term| term.agents.contains(agent) && term.window.holds(time));
+    let needs = Needs::of(terms.clone().map(|term| term.metric));
+    let values = needed_values(scenario, plan, (agent, node), needs, scratch);
     terms.fold(T::zero(), |sum, term| {
         let value = values.get(term.metric).unwrap_or_default() * term.weight * weight;
         if term.sense == Sense::Maximize { sum - value } else { sum + value }

@@ -86,6 +86,13 @@ pub struct Needs {
 impl Needs {
     pub(crate) const ALL: Self = Self { detection: true, false_alarm: true, location: true };
 
+    /// The groups that some metrics belong to.
+    pub(crate) fn of(metrics: impl IntoIterator<Item = Metric>) -> Self {
+        let mut needs = Self::default();
+        metrics.into_iter().for_each(|metric| needs.add(metric));
+        needs
+    }
+
     /// Adds the group that a metric belongs to.
     pub fn add(&mut self, metric: Metric) {
         match metric {

@@ -8,6 +8,7 @@
 //! Limits: [`Settings::iterations`] over all stages, [`Settings::line_search_steps`] a search.
 
 use crate::math::{Point, Real, norm};
+use crate::metrics::Needs;
 use crate::objective::merit::{Guard, Merit};
 use crate::objective::{self, Extreme};
 use crate::scenario::{Domain, Reduce, View};
@@ -188,10 +189,12 @@ where
 {
     let mut widest = T::zero();
     for term in scenario.terms.iter().filter(|term| term.reduce == Reduce::Extreme) {
+        let needs = Needs::of([term.metric]);
         for agent in 0..workspace.best.agents() {
             let (mut low, mut high) = (T::INFINITY, -T::INFINITY);
             for node in 1..workspace.best.nodes() {
-                let values = objective::node_values(scenario, &workspace.best, agent, node, &mut workspace.scratch);
+                let Workspace { best, scratch, .. } = &mut *workspace;
+                let values = objective::needed_values(scenario, best, (agent, node), needs, scratch);
                 if let Some(value) = values.get(term.metric) {
                     (low, high) = (low.min(value), high.max(value));
                 }

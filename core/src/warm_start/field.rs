@@ -13,6 +13,7 @@ use crate::constraints::region::horizontal;
 use crate::math::{Point, Real};
 use crate::metrics::{Needs, Sample, Situation, Values, forward};
 use crate::model::jamming::Emitter;
+use crate::objective::needed_values;
 use crate::scenario::{
     Agent, BeamPattern, Betrayal, Limit, Reduce, Region, Sense, StoredSensor, TERMS_MAX, Term, View, Window,
 };
@@ -150,7 +151,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
 
     /// The tangent at the path as it is.
     fn tangent(&self, term: &Term<T>, pass: usize, scratch: &mut [Sample<T, DIM>]) -> Tangent<T> {
-        let sign = sign(term);
+        let (sign, needs) = (sign(term), Needs::of([term.metric]));
         let (mut low, mut high) = (T::INFINITY, -T::INFINITY);
         let mut sum = T::zero();
         let mut sharpness = T::one();
@@ -161,7 +162,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
                 if !term.window.holds(time) {
                     continue;
                 }
-                let values = crate::objective::node_values(self.scenario, self.trajectory, self.index, node, scratch);
+                let values = needed_values(self.scenario, self.trajectory, (self.index, node), needs, scratch);
                 let Some(value) = values.get(term.metric) else {
                     continue;
                 };
@@ -361,7 +362,14 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         let betrayal = Betrayal::None;
         let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-        let values = forward(self.scenario, &here, &slice.emitters, Needs::ALL, scratch).values;
+        let values = forward(
+            self.scenario,
+            &here,
+            &slice.emitters,
+            Needs::of(self.scenario.limits.iter().map(|limit| limit.metric)),
+            scratch,
+        )
+        .values;
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));
         found.map(Blocked::Limit)
     }

@@ -270,6 +270,10 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         scratch: &mut [Sample<T, DIM>],
     ) -> Result<T, ()> {
         let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?.of_lattice();
+        if field.has_tangents() {
+            // Costs are those of the path before this pass.
+            self.landscape.begin();
+        }
         let plan = Plan::new(&field, variant, CELLS, PARENTS);
         self.tables.moves.collect(&plan.grid, plan.reach);
         let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
@@ -341,7 +345,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         if self.landscape.surveyed == key {
             return;
         }
-        let is_lasting = !field.is_moving() && !field.has_tangents();
+        let is_lasting = !field.is_moving();
         self.landscape.surveyed = Survey { is_known: is_lasting, ..key };
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.

@@ -5,8 +5,8 @@
 use heapless::Vec;
 
 use crate::math::Real;
-use crate::metrics::Sample;
-use crate::objective::node_values;
+use crate::metrics::{Needs, Sample};
+use crate::objective::needed_values;
 use crate::scenario::{Reduce, Sense, Term, View};
 use crate::trajectory::Trajectory;
 
@@ -45,9 +45,10 @@ impl<T: Real> Worst<T> {
         scratch: &mut [Sample<T, DIM>],
         mut visit: impl FnMut(usize, T),
     ) {
+        let needs = Needs::of([self.term.metric]);
         for (node, &time) in trajectory.times.iter().enumerate().take(trajectory.nodes()).skip(1) {
             if self.term.window.holds(time) {
-                let values = node_values(scenario, trajectory, self.agent, node, scratch);
+                let values = needed_values(scenario, trajectory, (self.agent, node), needs, scratch);
                 if let Some(value) = values.get(self.term.metric) {
                     visit(node, self.sign() * value);
                 }
