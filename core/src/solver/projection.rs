@@ -175,7 +175,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
         self.penalty = T::one();
         self.factor(frame);
         self.last_step = T::zero();
-        self.forget();
+        self.forget(frame);
     }
 
     fn factor(&mut self, frame: &Frame<T, DIM, AGENTS>) {
@@ -210,17 +210,20 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
         let penalty = wanted.clamp_to(T::real(PENALTY_RANGE.0), T::real(PENALTY_RANGE.1));
         let scale = self.penalty / penalty;
         self.penalty = penalty;
-        self.scale_multipliers(scale);
+        self.scale_multipliers(frame, scale);
         self.factor(frame);
     }
 
-    fn forget(&mut self) {
-        let none = Copied::zeros();
-        for copies in &mut self.copies {
-            copies.step.fill(none);
-            copies.bend.fill(none);
-            copies.place.fill(none);
-        }
+    /// The copies that a problem has.
+    fn used(&mut self, frame: &Frame<T, DIM, AGENTS>) -> impl Iterator<Item = &mut Copied<T, DIM>> {
+        let (agents, nodes) = (frame.agent().count(), frame.intervals + 1);
+        self.copies.iter_mut().take(agents).flat_map(move |Copies { step, bend, place }| {
+            [step, bend, place].into_iter().flat_map(move |copies| copies.iter_mut().take(nodes))
+        })
+    }
+
+    fn forget(&mut self, frame: &Frame<T, DIM, AGENTS>) {
+        self.used(frame).for_each(|copied| *copied = Copied::zeros());
         for budget in self.budgets.iter_mut().flatten() {
             budget.multiplier = T::zero();
         }
@@ -235,7 +238,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
         result: &mut Iterate<T, DIM, NODES, AGENTS>,
     ) -> usize {
         if self.last_step > T::zero() {
-            self.rescale(request.step);
+            self.rescale(request);
         } else {
             self.last_step = request.step;
             self.seed(request, iterate);
@@ -263,18 +266,13 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
     }
 
     /// Multipliers are proportional to the step that they resist.
-    fn rescale(&mut self, step: T) {
-        self.scale_multipliers(step / self.last_step);
-        self.last_step = step;
+    fn rescale(&mut self, request: &Request<'_, T, DIM, AGENTS>) {
+        self.scale_multipliers(request.frame, request.step / self.last_step);
+        self.last_step = request.step;
     }
 
-    fn scale_multipliers(&mut self, ratio: T) {
-        for copies in &mut self.copies {
-            let all = copies.step.iter_mut().chain(&mut copies.bend).chain(&mut copies.place);
-            for copied in all {
-                copied.multiplier *= ratio;
-            }
-        }
+    fn scale_multipliers(&mut self, frame: &Frame<T, DIM, AGENTS>, ratio: T) {
+        self.used(frame).for_each(|copied| copied.multiplier *= ratio);
         for budget in self.budgets.iter_mut().flatten() {
             budget.multiplier *= ratio;
         }

@@ -1,6 +1,7 @@
 //! Memory that the lattice of the global start and the refinement have by turns: neither needs what the other leaves.
 //!
-//! Limits: whoever takes it from the other finds all zeros.
+//! With the feature `roomy` each has its own. Otherwise whoever takes it from the other clears all of it, which takes longer
+//! than a short plan where capacities are large.
 
 use crate::math::Real;
 use crate::warm_start::Tables;
@@ -8,36 +9,78 @@ use crate::warm_start::Tables;
 use super::refine::Refinement;
 use super::workspace::{LATTICE_CELLS, LATTICE_PARENTS};
 
-/// Whose turn it is.
-// Empty memory is all zeros, and so is the number of the first variant: a static workspace takes no room in an image.
-#[derive(Clone, Debug)]
-#[repr(u8)]
-#[expect(clippy::large_enum_variant, reason = "there is no heap to put either on")]
-pub(super) enum Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
-    Lattice(Tables<T, LATTICE_CELLS, LATTICE_PARENTS>),
-    Refinement(Refinement<T, DIM, NODES, AGENTS>),
-}
+pub(super) use layout::Turns;
 
-impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Turns<T, DIM, NODES, AGENTS> {
-    /// The lattice's, empty.
-    pub(super) const LATTICE: Self = Self::Lattice(Tables::EMPTY);
-    /// The refinement's, empty. A constant, so that no copy of it comes onto the stack; it lies in an image in full, because it is
-    /// not all zeros, but there is more flash than RAM.
-    const REFINEMENT: Self = Self::Refinement(Refinement::EMPTY);
+/// What the lattice works on.
+type LatticeTables<T> = Tables<T, LATTICE_CELLS, LATTICE_PARENTS>;
 
-    /// For the lattice; `None` never comes.
-    pub(super) fn lattice(&mut self) -> Option<&mut Tables<T, LATTICE_CELLS, LATTICE_PARENTS>> {
-        if !matches!(self, Self::Lattice(_)) {
-            *self = Self::LATTICE;
-        }
-        if let Self::Lattice(tables) = self { Some(tables) } else { None }
+#[cfg(feature = "roomy")]
+mod layout {
+    use super::{LatticeTables, Real, Refinement};
+
+    /// Memory of both.
+    #[derive(Clone, Debug)]
+    pub(in crate::solver) struct Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+        lattice: LatticeTables<T>,
+        refinement: Refinement<T, DIM, NODES, AGENTS>,
     }
 
-    /// For the refinement; `None` never comes.
-    pub(super) fn refinement(&mut self) -> Option<&mut Refinement<T, DIM, NODES, AGENTS>> {
-        if !matches!(self, Self::Refinement(_)) {
-            *self = Self::REFINEMENT;
+    impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Turns<T, DIM, NODES, AGENTS> {
+        /// All zeros.
+        pub(in crate::solver) const EMPTY: Self =
+            Self { lattice: LatticeTables::EMPTY, refinement: Refinement::EMPTY };
+        /// Bytes more than where memory is shared, at most.
+        pub(in crate::solver) const ROOM: usize = size_of::<LatticeTables<T>>();
+
+        /// For the lattice.
+        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables<T>> {
+            Some(&mut self.lattice)
         }
-        if let Self::Refinement(refinement) = self { Some(refinement) } else { None }
+
+        /// For the refinement.
+        pub(in crate::solver) fn refinement(&mut self) -> Option<&mut Refinement<T, DIM, NODES, AGENTS>> {
+            Some(&mut self.refinement)
+        }
+    }
+}
+
+#[cfg(not(feature = "roomy"))]
+mod layout {
+    use super::{LatticeTables, Real, Refinement};
+
+    /// Whose turn it is.
+    // Empty memory is all zeros, and so is the number of the first variant: a static workspace takes no room in an image.
+    #[derive(Clone, Debug)]
+    #[repr(u8)]
+    #[expect(clippy::large_enum_variant, reason = "there is no heap to put either on")]
+    pub(in crate::solver) enum Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
+        Lattice(LatticeTables<T>),
+        Refinement(Refinement<T, DIM, NODES, AGENTS>),
+    }
+
+    impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Turns<T, DIM, NODES, AGENTS> {
+        /// The lattice's, empty.
+        pub(in crate::solver) const EMPTY: Self = Self::Lattice(LatticeTables::EMPTY);
+        /// Bytes more than where memory is shared.
+        pub(in crate::solver) const ROOM: usize = 0;
+        /// The refinement's, empty. A constant, so that no copy of it comes onto the stack; it lies in an image in full,
+        /// because it is not all zeros, but there is more flash than RAM.
+        const REFINEMENT: Self = Self::Refinement(Refinement::EMPTY);
+
+        /// For the lattice; `None` never comes.
+        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables<T>> {
+            if !matches!(self, Self::Lattice(_)) {
+                *self = Self::EMPTY;
+            }
+            if let Self::Lattice(tables) = self { Some(tables) } else { None }
+        }
+
+        /// For the refinement; `None` never comes.
+        pub(in crate::solver) fn refinement(&mut self) -> Option<&mut Refinement<T, DIM, NODES, AGENTS>> {
+            if !matches!(self, Self::Refinement(_)) {
+                *self = Self::REFINEMENT;
+            }
+            if let Self::Refinement(refinement) = self { Some(refinement) } else { None }
+        }
     }
 }
