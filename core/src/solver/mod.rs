@@ -59,7 +59,7 @@ use crate::math::Real;
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 
-/// Why the planner stopped. Every status but [`Status::Infeasible`] comes with a feasible plan.
+/// Why the planner stopped. Every status but [`Status::Infeasible`] and [`Status::NonFinite`] comes with a feasible plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Status {
@@ -71,9 +71,10 @@ pub enum Status {
     Deadline,
     /// No feasible plan was found; [`Outcome::obstacle`] says what stands in the way.
     Infeasible,
-    /// No step along the projected gradient improves the plan any more, and the gradient has not vanished.
+    /// No step along the projected gradient improves the plan any more, and the gradient has not vanished, or has left the
+    /// range of the numbers.
     Stalled,
-    /// The objective or its gradient is not a finite number at the plan.
+    /// The objective is not a finite number where planning begins.
     NonFinite,
 }
 

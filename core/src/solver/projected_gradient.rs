@@ -133,7 +133,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
         let merit = Merit { extreme: Extreme::Exact, objective: T::zero(), guard: penalty };
         ledger.best = T::INFINITY;
         ledger.keeps = Keeps::Clearer;
-        let ending = self.descent(merit, self.before + self.settings.iterations).run(workspace, ledger, deadline);
+        self.descent(merit, self.before + self.settings.iterations).run(workspace, ledger, deadline);
         ledger.keeps = Keeps::Better;
         let slack = guard::smallest_slack(self.scenario, &workspace.best, &mut workspace.scratch);
         ledger.best = objective::value(self.scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
@@ -141,11 +141,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
         if slack > T::zero() {
             return None;
         }
-        match ending {
-            Ending::Stop(Status::NonFinite) => Some(Status::NonFinite),
-            // Cut off or not: what there is cannot be flown.
-            Ending::Stop(_) | Ending::Status(_) => Some(Status::Infeasible),
-        }
+        // Cut off or not: what there is cannot be flown.
+        Some(Status::Infeasible)
     }
 
     fn descent(&self, merit: Merit<T>, quota: usize) -> Descent<'_, T, DIM, AGENTS> {
@@ -247,7 +244,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Descent<'_, T, DIM, AGENTS>
     ) -> Ending {
         let mut value = self.differentiate_iterate(workspace, ledger);
         if !value.finite() {
-            return Ending::Stop(Status::NonFinite);
+            // The incumbent has an objective; it is derivatives, or barriers, that overflow there.
+            return Ending::Stop(Status::Stalled);
         }
         let first_step = self.first_step(workspace);
         let mut step = first_step;

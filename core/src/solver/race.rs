@@ -138,7 +138,8 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
         let level = if is_alike { found.level } else { ledger.best };
         let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
-        if status != Status::Infeasible && (new.least < found.least || found.least == T::INFINITY) {
+        let has_plan = !matches!(status, Status::Infeasible | Status::NonFinite);
+        if has_plan && (new.least < found.least || found.least == T::INFINITY) {
             if !is_alike && self.ways == Ways::All {
                 self.second = *found;
                 workspace.second.assign(&workspace.champion);
@@ -146,7 +147,7 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
             self.found = new;
             workspace.champion.assign(&workspace.best);
             self.idle = 0;
-        } else if status != Status::Infeasible && new.least < self.second.least {
+        } else if has_plan && new.least < self.second.least {
             if !is_alike && self.ways == Ways::All {
                 self.second = new;
                 workspace.second.assign(&workspace.best);

@@ -90,7 +90,7 @@ fn problems_keep_their_promises() {
 /// rounding, an anchor that bends.
 #[test]
 fn numbered_problems_that_were_found_keep_their_promises() {
-    for index in [4, 5, 14, 15, 31, 54, 66, 67, 317, 321, 1528, 3298, 3299] {
+    for index in [4, 5, 14, 15, 31, 54, 66, 67, 317, 321, 1528, 3298, 3299, 9255] {
         let (kind, mut draws) = numbered(8, index);
         let verdict =
             draws.find_map(|bytes| Some(of_kind(kind, &bytes)).filter(|found| *found != Ok(Verdict::Refused)));
