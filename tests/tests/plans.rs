@@ -83,9 +83,14 @@ fn every_scenario_is_planned_as_well_as_the_best_known_plan() {
 
 #[test]
 fn single_precision_plans_nearly_as_well() {
-    for name in
-        ["square8-detection", "square8-energy", "square8-aee-lagged", "square8-worst-detection", "volume8-detection"]
-    {
+    for name in [
+        "square8-detection",
+        "square8-energy",
+        "square8-aee-lagged",
+        "square8-worst-detection",
+        "volume8-detection",
+        "swarm4",
+    ] {
         let (_, double) = planned(name, Precision::F64);
         let (_, single) = planned(name, Precision::F32);
         let gap = relative(single.objective, double.objective);

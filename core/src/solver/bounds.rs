@@ -16,7 +16,7 @@
 //! every node of every agent once, and each visit every sensor.
 
 use crate::math::Real;
-use crate::warm_start::{Level, VARIANTS_MAX};
+use crate::warm_start::{LARGE_TEAM, Level, VARIANTS_MAX};
 
 use super::{Settings, global, neighbours, projected_gradient, race, refine};
 
@@ -60,7 +60,8 @@ impl<T: Real> Settings<T> {
         let (challengers, finished) = if self.candidates > 1 {
             let retimed = 2 * race::RETIMES_MAX;
             let elsewhere = agents * Level::ALL.len();
-            let changed = neighbours::SIDES_MAX + elsewhere + retimed * neighbours::TIMES_MAX;
+            let again = if agents < LARGE_TEAM { 0 } else { 1 };
+            let changed = neighbours::SIDES_MAX + elsewhere + again + retimed * neighbours::TIMES_MAX;
             (changed, 3 + retimed + race::EQUIPS_MAX)
         } else {
             (0, 2)

@@ -1,7 +1,7 @@
 //! The global start: lattice paths, made feasible, for [`super::race`] to find the best of.
 //!
 //! Limits: lattice paths end once [`IDLE_MAX`] in a row brought nothing. A team is searched agent by agent, each with
-//! the others frozen, in every order where it is small and its agents affect each other.
+//! the others frozen: in every order where it is small and its agents affect each other, and once more where it is large.
 
 use crate::constraints::region::horizontal;
 use crate::constraints::{Constraint, separation};
@@ -108,6 +108,12 @@ where
     if race.is_thorough() && !race.is_large() {
         race.change_sides(workspace, ledger, deadline);
     }
+    if race.is_thorough()
+        && race.is_large()
+        && let Some(variant) = hurried.first()
+    {
+        lay_again(scenario, &mut race, (variant, &prices), workspace, ledger, deadline);
+    }
     if has_equipment(scenario) && race.is_thorough() && !race.is_large() {
         race.change_levels(workspace, ledger, deadline);
     }
@@ -119,6 +125,31 @@ where
         }
     }
     (status, None)
+}
+
+/// Lays the ways of a team once more, each with the others on theirs: before, they were on straight lines. Better ways become
+/// the champion.
+fn lay_again<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    race: &mut Race<'_, T, DIM>,
+    (variant, prices): (&Variant<T>, &[Prices<T>; AGENTS]),
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) where
+    T: Real,
+{
+    workspace.base.assign(&workspace.champion);
+    if deadline() || lay(scenario, variant, (0, prices), workspace).is_err() {
+        return;
+    }
+    if has_equipment(scenario) {
+        equip(scenario, workspace, &mut [Prices::default(); AGENTS]);
+    }
+    if project(scenario, race.settings, workspace, ledger).is_some() {
+        workspace.best.assign(&workspace.trial);
+        race.run(workspace, ledger, deadline);
+    }
 }
 
 /// Flight times that no penalty on lateness speaks for, up to the last one allowed: where there is no way in time, a late

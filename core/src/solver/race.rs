@@ -68,7 +68,7 @@ enum Ways {
 /// Candidates, one after the other.
 pub(super) struct Race<'a, T, const DIM: usize> {
     scenario: &'a View<'a, T, DIM>,
-    settings: &'a Settings<T>,
+    pub(super) settings: &'a Settings<T>,
     pub(super) found: Found<T>,
     /// The best that goes another way.
     second: Found<T>,
