@@ -105,17 +105,8 @@ where
         let closing = if let Way::Closed { by, .. } = way { Some(by) } else { None };
         return (Status::Infeasible, closing);
     }
-    if race.is_thorough() && !race.is_large() {
-        race.change_sides(workspace, ledger, deadline);
-    }
-    if race.is_thorough()
-        && race.is_large()
-        && let Some(variant) = hurried.first()
-    {
-        lay_again(scenario, &mut race, (variant, &prices), workspace, ledger, deadline);
-    }
-    if has_equipment(scenario) && race.is_thorough() && !race.is_large() {
-        race.change_levels(workspace, ledger, deadline);
+    if race.is_thorough() {
+        challenge(scenario, &mut race, (&hurried, &prices), workspace, ledger, deadline);
     }
     let mut status = race.finish_both(workspace, ledger, deadline);
     if has_equipment(scenario) && race.is_thorough() {
@@ -125,6 +116,26 @@ where
         }
     }
     (status, None)
+}
+
+/// Challenges the champion by what is near it; in a large team, where that is much, by ways that know the others'.
+fn challenge<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    race: &mut Race<'_, T, DIM>,
+    (variants, prices): (&[Variant<T>], &[Prices<T>; AGENTS]),
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) where
+    T: Real,
+{
+    if let Some(variant) = variants.first().filter(|_| race.is_large()) {
+        return lay_again(scenario, race, (variant, prices), workspace, ledger, deadline);
+    }
+    race.change_sides(workspace, ledger, deadline);
+    if has_equipment(scenario) {
+        race.change_levels(workspace, ledger, deadline);
+    }
 }
 
 /// Lays the ways of a team once more, each with the others on theirs: before, they were on straight lines. Better ways become
