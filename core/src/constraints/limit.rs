@@ -4,8 +4,7 @@
 
 use crate::constraints::{Worst, raise};
 use crate::math::Real;
-use crate::metrics::Needs;
-use crate::metrics::Sample;
+use crate::metrics::{Needs, Sample};
 use crate::objective::needed_values;
 use crate::scenario::{LIMITS_MAX, Limit, View};
 use crate::trajectory::Trajectory;
@@ -22,7 +21,7 @@ pub fn excess<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize
     if scenario.limits.is_empty() {
         return worst;
     }
-    let needs = Needs::of(scenario.limits.iter().map(|limit| limit.metric));
+    let needs = Needs::of_limits(scenario.limits);
     for node in 1..trajectory.nodes() {
         let values = needed_values(scenario, trajectory, (agent, node), needs, scratch);
         for (limit, worst) in scenario.limits.iter().zip(&mut worst) {

@@ -28,7 +28,7 @@ pub use sample::Sample;
 pub(crate) use sample::{Outcome, Situation, backward, forward};
 
 use crate::math::Real;
-use crate::scenario::Metric;
+use crate::scenario::{Limit, Metric};
 
 /// What all location errors are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,6 +85,11 @@ pub struct Needs {
 
 impl Needs {
     pub(crate) const ALL: Self = Self { detection: true, false_alarm: true, location: true };
+
+    /// What the limits of a scenario need to know.
+    pub(crate) fn of_limits<T>(limits: &[Limit<T>]) -> Self {
+        Self::of(limits.iter().map(|limit| limit.metric))
+    }
 
     /// The groups that some metrics belong to.
     pub(crate) fn of(metrics: impl IntoIterator<Item = Metric>) -> Self {

@@ -129,8 +129,8 @@ fn challenge<T, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
 ) where
     T: Real,
 {
-    if let Some(variant) = variants.first().filter(|_| race.is_large()) {
-        return lay_again(scenario, race, (variant, prices), workspace, ledger, deadline);
+    if race.is_large() {
+        return lay_again(scenario, race, (variants, prices), workspace, ledger, deadline);
     }
     race.change_sides(workspace, ledger, deadline);
     if has_equipment(scenario) {
@@ -143,13 +143,14 @@ fn challenge<T, const DIM: usize, const NODES: usize, const SENSORS: usize, cons
 fn lay_again<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     race: &mut Race<'_, T, DIM>,
-    (variant, prices): (&Variant<T>, &[Prices<T>; AGENTS]),
+    (variants, prices): (&[Variant<T>], &[Prices<T>; AGENTS]),
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ledger: &mut Ledger<T>,
     deadline: &mut dyn FnMut() -> bool,
 ) where
     T: Real,
 {
+    let Some(variant) = variants.first() else { return };
     workspace.base.assign(&workspace.champion);
     if deadline() || lay(scenario, variant, (0, prices), workspace).is_err() {
         return;

@@ -7,8 +7,7 @@
 
 use crate::constraints::clearance::{Clearance, clearance, separation_clearance};
 use crate::math::{Point, Real};
-use crate::metrics::Needs;
-use crate::metrics::Sample;
+use crate::metrics::{Needs, Sample};
 use crate::objective::merit::{Guard, Merit, slacks};
 use crate::objective::{self, Extreme, needed_values};
 use crate::scenario::View;
@@ -82,7 +81,7 @@ pub(super) fn smallest_slack<T: Real, const DIM: usize, const NODES: usize, cons
     let mut take = |slack: T| smallest = if slack < smallest || slack.is_not_a_number() { slack } else { smallest };
     for_each_clearance(scenario, trajectory, |_, value, _| take(value));
     if !scenario.limits.is_empty() {
-        let needs = Needs::of(scenario.limits.iter().map(|limit| limit.metric));
+        let needs = Needs::of_limits(scenario.limits);
         for agent in 0..trajectory.agents() {
             for node in 1..trajectory.nodes() {
                 let values = needed_values(scenario, trajectory, (agent, node), needs, scratch);

@@ -1,7 +1,7 @@
 //! Memory that the lattice of the global start and the refinement have by turns: neither needs what the other leaves.
 //!
-//! With the feature `roomy` each has its own. Otherwise whoever takes it from the other clears all of it, which takes longer
-//! than a short plan where capacities are large.
+//! With the feature `roomy` each has its own. Otherwise whoever takes it from the other clears all of it, which takes as long
+//! as capacities are large, whatever the problem.
 
 use crate::math::Real;
 use crate::warm_start::Tables;
@@ -29,8 +29,12 @@ mod layout {
         /// All zeros.
         pub(in crate::solver) const EMPTY: Self =
             Self { lattice: LatticeTables::EMPTY, refinement: Refinement::EMPTY };
-        /// Bytes more than where memory is shared, at most.
-        pub(in crate::solver) const ROOM: usize = size_of::<LatticeTables<T>>();
+        /// Bytes more than where memory is shared: what the smaller of both takes.
+        pub(in crate::solver) const ROOM: usize = {
+            let (lattice, refinement) =
+                (size_of::<LatticeTables<T>>(), size_of::<Refinement<T, DIM, NODES, AGENTS>>());
+            if lattice < refinement { lattice } else { refinement }
+        };
 
         /// For the lattice.
         pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables<T>> {

@@ -362,14 +362,8 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         let betrayal = Betrayal::None;
         let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-        let values = forward(
-            self.scenario,
-            &here,
-            &slice.emitters,
-            Needs::of(self.scenario.limits.iter().map(|limit| limit.metric)),
-            scratch,
-        )
-        .values;
+        let needs = Needs::of_limits(self.scenario.limits);
+        let values = forward(self.scenario, &here, &slice.emitters, needs, scratch).values;
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));
         found.map(Blocked::Limit)
     }

@@ -8,12 +8,14 @@
 //! |---|---|
 //! | [`body`] | how it moves |
 //! | `command` | commands and their answers |
+//! | `flight` | its modes, and the steps of its body |
 //! | `guided` | setpoints |
 //! | `mission` | missions in the air |
 //! | `param` | parameters |
 //! | [`payload`] | transmitters and jammers on board |
 //! | `say`, `stream` | what it says, and how often |
 //! | [`serve`] | a machine on a real link |
+//! | `settings` | what to simulate |
 //! | [`storage`] | missions, fences and rally points, and the transfers that change them |
 //! | [`trouble`] | what goes wrong on purpose |
 //!
@@ -24,12 +26,14 @@
 
 pub mod body;
 mod command;
+mod flight;
 mod guided;
 mod mission;
 mod param;
 pub mod payload;
 mod say;
 pub mod serve;
+mod settings;
 pub mod storage;
 mod stream;
 pub mod trouble;
@@ -38,126 +42,28 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use quietpath_bridge::clock::Time;
-use quietpath_bridge::file::ScenarioFile;
-use quietpath_bridge::file::scenario::{AgentEntry, Origin};
-use quietpath_bridge::frame::{Altitude, LocalFrame, Place};
+use quietpath_bridge::file::scenario::Origin;
+use quietpath_bridge::frame::{LocalFrame, Place};
 use quietpath_bridge::link::codec::plain_bytes;
 use quietpath_bridge::link::dialect::*;
 use quietpath_bridge::link::{Frame, Identity};
 use quietpath_bridge::mission::{Item, List};
 use quietpath_bridge::telemetry::{Autopilot, Mode};
 
-use body::{Aim, Body, Limits, Vector};
+pub use flight::STEP;
+pub use settings::{Home, Pilot, Settings};
+
+use body::{Body, Vector};
 use guided::{Guided, Taken};
-use mission::{Event, Run, Surroundings};
+use mission::Run;
 use param::Params;
-use payload::{Payload, Spec};
+use payload::Payload;
 use storage::Storage;
 use stream::Streams;
-use trouble::{Rival, Station, Trouble};
+use trouble::{Rival, Station};
 
-/// Step of the body.
-pub const STEP: Duration = Duration::from_millis(20);
 /// Time between heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
-/// Longest time that is made up for in one go.
-const CATCH_UP_MAX: Duration = Duration::from_secs(10);
-/// How fast it descends to land, m/s.
-const DESCENT: f64 = 1.0;
-/// How near a height, or home, is reached, m.
-const NEAR: f64 = 0.5;
-/// Speed of a vehicle over that of its plans.
-const SPEED_RESERVE: f64 = 1.05;
-/// Acceleration of a vehicle over that of its plans.
-const ACCEL_RESERVE: f64 = 2.0;
-/// Least acceleration of a vehicle, m/s^2.
-const ACCEL_MIN: f64 = 1.0;
-/// How long a pilot waits before doing something.
-const PATIENCE: Duration = Duration::from_secs(3);
-
-/// Where the vehicle stands when it is switched on, and what it counts altitudes from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Home {
-    /// Latitude, WGS-84 degrees.
-    pub latitude_deg: f64,
-    /// Longitude, WGS-84 degrees.
-    pub longitude_deg: f64,
-    /// Altitude above mean sea level, m.
-    pub altitude_m: f64,
-}
-
-/// The person with the remote control.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Pilot {
-    /// Nobody: the vehicle stands on the ground until MAVLink, or a caller, moves it.
-    #[default]
-    Nobody,
-    /// Arms, takes off to a height above home, m, and leaves the vehicle there.
-    TakesOff(f64),
-    /// Waits for a mission, arms and starts it.
-    StartsMission,
-}
-
-/// What to simulate.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// Which autopilot it is like.
-    pub like: Autopilot,
-    /// Its system id.
-    pub system: u8,
-    /// Where it stands.
-    pub home: Home,
-    /// What it is capable of.
-    pub limits: Limits,
-    /// What is on board.
-    pub payloads: Vec<Spec>,
-    /// Who flies it.
-    pub pilot: Pilot,
-    /// What goes wrong.
-    pub troubles: Vec<Trouble>,
-    /// Commands that it takes in COMMAND_INT only, on top of its kind's.
-    pub int_only: Vec<MavCmd>,
-    /// Commands that it takes in COMMAND_LONG only, on top of its kind's.
-    pub long_only: Vec<MavCmd>,
-}
-
-impl Settings {
-    /// A vehicle for an agent of a scenario: it stands on the ground below the agent's start, and its speed and acceleration
-    /// leave a little for catching up. `None` where the scenario says neither where it lies nor of such an agent.
-    #[must_use]
-    pub fn for_agent(like: Autopilot, scenario: &ScenarioFile, agent: Option<&str>) -> Option<Self> {
-        let is_it = |entry: &&AgentEntry| agent.is_none_or(|name| entry.name == name);
-        let entry = scenario.agents.iter().find(is_it)?;
-        let start = LocalFrame::of(scenario)?.place(&entry.start);
-        let altitude_m = if scenario.dimension == 3 { scenario.frame.origin?.altitude_m } else { 0.0 };
-        let Place { latitude_deg, longitude_deg, .. } = start;
-        let unit = scenario.frame.unit_m;
-        let limits = Limits {
-            speed_max: SPEED_RESERVE * entry.speed_max * unit,
-            accel_max: (ACCEL_RESERVE * entry.accel_max * unit).max(ACCEL_MIN),
-            ..Limits::default()
-        };
-        Some(Self { limits, ..Self::new(like, Home { latitude_deg, longitude_deg, altitude_m }) })
-    }
-
-    /// The height above home of an agent's start, m: where a pilot takes off to.
-    #[must_use]
-    pub fn start_height(&self, scenario: &ScenarioFile, agent: Option<&str>) -> Option<f64> {
-        let entry = scenario.agents.iter().find(|entry| agent.is_none_or(|name| entry.name == name))?;
-        Some(match LocalFrame::of(scenario)?.place(&entry.start).altitude {
-            Altitude::AboveHome(meters) => meters,
-            Altitude::AboveSeaLevel(meters) => meters - self.home.altitude_m,
-        })
-    }
-
-    /// A vehicle like one of a kind, at home, without payloads, pilot or trouble.
-    #[must_use]
-    pub fn new(like: Autopilot, home: Home) -> Self {
-        let (payloads, troubles, int_only, long_only) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (limits, pilot) = (Limits::default(), Pilot::Nobody);
-        Self { like, system: 1, home, limits, payloads, pilot, troubles, int_only, long_only }
-    }
-}
 
 /// Whether it flies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -370,231 +276,6 @@ impl Machine {
 
     fn say_as(&mut self, from: Identity, message: MavMessage) {
         self.out.push(Sent { from, message });
-    }
-
-    /// Moves the body up to now.
-    fn move_on(&mut self) {
-        let mut at = self.stepped.unwrap_or(self.now);
-        if self.now.since(at) > CATCH_UP_MAX {
-            at = Time::from_micros(self.now.micros().saturating_sub(CATCH_UP_MAX.as_micros() as u64));
-        }
-        while self.now.since(at) >= STEP {
-            at = at + STEP;
-            self.step(at);
-        }
-        self.stepped = Some(at);
-    }
-
-    fn step(&mut self, at: Time) {
-        let aim = self.aim(at);
-        // On the ground nothing moves that does not take off.
-        if self.landed == Landed::Ground {
-            (self.body.velocity, self.hold) = ([0.0; 3], self.body.position);
-            return;
-        }
-        let mut limits = self.settings.limits;
-        if let Some(speed) = self.speed_max() {
-            limits.speed_max = limits.speed_max.min(speed);
-        }
-        self.body.step(STEP.as_secs_f64(), &aim, &limits);
-        let height = self.body.position[2];
-        match self.landed {
-            Landed::Rising if self.lifting.is_none() && height > NEAR => self.landed = Landed::Air,
-            Landed::Landing if height <= 0.0 => {
-                self.landed = Landed::Ground;
-                self.disarm();
-            }
-            _ => {}
-        }
-        if let Some((target, after)) = self.lifting
-            && height > target - NEAR
-        {
-            self.lifting = None;
-            self.landed = Landed::Air;
-            self.hold = [self.hold[0], self.hold[1], target];
-            self.mode = after;
-        }
-    }
-
-    /// The largest speed that the parameters allow, m/s.
-    fn speed_max(&self) -> Option<f64> {
-        match self.settings.like {
-            Autopilot::Px4 => self.params.number("MPC_XY_VEL_MAX"),
-            Autopilot::ArduPilot => self.params.number("WPNAV_SPEED").map(|speed| speed / 100.0),
-        }
-    }
-
-    fn seconds(&self, name: &str) -> Duration {
-        Duration::try_from_secs_f64(self.params.number(name).unwrap_or(1.0)).unwrap_or_default()
-    }
-
-    /// What the body is steered by at a time.
-    fn aim(&mut self, at: Time) -> Aim {
-        if self.down.is_some() || self.killed.is_some() {
-            return Aim::Nothing;
-        }
-        if let Some((height, _)) = self.lifting {
-            return Aim::Rest([self.hold[0], self.hold[1], height]);
-        }
-        match self.mode {
-            Mode::Guided => self.aim_guided(at),
-            Mode::Mission => self.aim_mission(at),
-            Mode::Return => {
-                let [east, north, height] = self.body.position;
-                if east.hypot(north) < NEAR {
-                    self.change_mode(Mode::Land);
-                }
-                Aim::Rest([0.0, 0.0, height.max(self.hold[2])])
-            }
-            Mode::Land => {
-                if self.landed == Landed::Air || self.landed == Landed::Rising {
-                    self.landed = Landed::Landing;
-                }
-                Aim::Velocity([0.0, 0.0, -DESCENT])
-            }
-            Mode::Hold | Mode::Other => Aim::Rest(self.hold),
-        }
-    }
-
-    fn aim_guided(&mut self, at: Time) -> Aim {
-        let kind = self.settings.like;
-        if kind == Autopilot::Px4 && self.guided.has_ended(at, self.seconds("COM_OF_LOSS_T")) {
-            self.change_mode(Mode::Hold);
-            return Aim::Rest(self.hold);
-        }
-        if kind == Autopilot::Px4 && self.armed && self.landed == Landed::Ground {
-            self.landed = Landed::Rising;
-        }
-        let timeout = if kind == Autopilot::ArduPilot { self.seconds("GUID_TIMEOUT") } else { Duration::MAX };
-        self.guided.aim(at, kind, timeout).unwrap_or(Aim::Rest(self.hold))
-    }
-
-    fn aim_mission(&mut self, at: Time) -> Aim {
-        let acceptance = match self.settings.like {
-            Autopilot::Px4 => self.params.number("NAV_ACC_RAD"),
-            Autopilot::ArduPilot => self.params.number("WPNAV_RADIUS").map(|radius| radius / 100.0),
-        };
-        let around = Surroundings {
-            kind: self.settings.like,
-            items: &self.storage.lists[0],
-            frame: &self.frame,
-            home_altitude: self.settings.home.altitude_m,
-            acceptance: acceptance.unwrap_or(2.0),
-        };
-        let mut events = Vec::new();
-        let aim = self.run.fly(at, &self.body, &around, &mut events);
-        if self.armed && self.landed == Landed::Ground && matches!(aim, Aim::Leg { .. }) {
-            self.landed = Landed::Rising;
-        }
-        let is_news = !events.is_empty();
-        for event in events {
-            match event {
-                Event::Reached(seq) => {
-                    self.say(MavMessage::MISSION_ITEM_REACHED(MISSION_ITEM_REACHED_DATA { seq }));
-                }
-                Event::Output(output, value) => {
-                    self.outputs.insert(output, value);
-                }
-                Event::Wants(mode) => {
-                    self.change_mode(mode);
-                }
-            }
-        }
-        if is_news {
-            self.say(MavMessage::MISSION_CURRENT(self.mission_current()));
-        }
-        aim
-    }
-
-    /// What a pilot does.
-    fn fly_by_hand(&mut self) {
-        let is_time = match self.settings.pilot {
-            Pilot::Nobody => false,
-            Pilot::TakesOff(_) => true,
-            // Not in the middle of a transfer, nor right behind it: companions read back.
-            Pilot::StartsMission => {
-                !self.list(List::Mission).is_empty()
-                    && !self.storage.is_receiving()
-                    && self.now.since(self.storage.heard()) > PATIENCE
-            }
-        };
-        if !is_time || self.landed != Landed::Ground {
-            return;
-        }
-        let since = *self.pilot_since.get_or_insert(self.now);
-        if self.now.since(since) < PATIENCE {
-            return;
-        }
-        match self.settings.pilot {
-            Pilot::Nobody => {}
-            Pilot::TakesOff(height) => {
-                self.take_off(height);
-            }
-            Pilot::StartsMission => {
-                self.arm();
-                self.change_mode(Mode::Mission);
-            }
-        }
-        // Once: a vehicle that has landed stays on the ground.
-        self.settings.pilot = Pilot::Nobody;
-    }
-
-    /// Arms.
-    pub const fn arm(&mut self) {
-        self.armed = true;
-    }
-
-    /// Disarms; in the air the motors stop, and it stands on the ground.
-    pub fn disarm(&mut self) {
-        (self.armed, self.landed, self.lifting) = (false, Landed::Ground, None);
-        self.body.position[2] = 0.0;
-        self.run.go_on_at(0, self.body.position);
-    }
-
-    /// A person arms and takes off by hand, to a height above home, m, and leaves it there.
-    pub fn take_off(&mut self, height: f64) {
-        self.arm();
-        self.lift(height, Mode::Hold);
-    }
-
-    fn lift(&mut self, height: f64, after: Mode) {
-        if self.landed != Landed::Ground {
-            return;
-        }
-        self.landed = Landed::Rising;
-        self.hold = self.body.position;
-        self.mode = if after == Mode::Guided { after } else { Mode::Hold };
-        self.lifting = Some((height, after));
-    }
-
-    /// Changes the mode, as a person or a companion may; false where it is not granted.
-    pub fn change_mode(&mut self, mode: Mode) -> bool {
-        let is_granted = match mode {
-            Mode::Guided => self.guided.is_granted(self.now, self.settings.like),
-            Mode::Mission => !self.list(List::Mission).is_empty(),
-            Mode::Return | Mode::Land | Mode::Hold | Mode::Other => true,
-        };
-        if !is_granted || mode == self.mode {
-            return is_granted;
-        }
-        if self.settings.like == Autopilot::ArduPilot {
-            self.guided.forget();
-        }
-        if mode == Mode::Mission {
-            self.run.resume(self.body.position);
-        }
-        self.lifting = None;
-        (self.mode, self.hold) = (mode, self.body.position);
-        true
-    }
-
-    /// Goes on with the mission at an item; false where there is none.
-    pub fn set_current(&mut self, item: u16) -> bool {
-        let is_there = usize::from(item) < self.list(List::Mission).len();
-        if is_there {
-            self.run.go_on_at(item, self.body.position);
-        }
-        is_there
     }
 
     /// What it is.

@@ -97,6 +97,9 @@ pub struct Trial {
     pub strike: fn(&mut Rehearsal, &mut Around),
     /// For how long it does so, at every step; 0 is once.
     pub span_s: f64,
+    /// For how long after it the speed does not count, s: a vehicle that has missed setpoints hurries after them, as fast as
+    /// its own limits let it.
+    pub hurry_s: f64,
     /// When it strikes: while the plan is flown, or before.
     pub when: When,
     /// Whether anything may be jammed after it.
@@ -136,8 +139,14 @@ pub enum After {
 
 impl Trial {
     /// Nothing goes wrong.
-    pub const NONE: Self =
-        Self { prepare: |_, _| {}, strike: |_, _| {}, span_s: 0.0, when: When::Flying, after: After::Jams };
+    pub const NONE: Self = Self {
+        prepare: |_, _| {},
+        strike: |_, _| {},
+        span_s: 0.0,
+        hurry_s: 0.0,
+        when: When::Flying,
+        after: After::Jams,
+    };
 }
 
 fn setup(mode: FlyMode, seed: u64) -> Setup {
@@ -172,6 +181,8 @@ struct Watched {
     flown: f64,
     /// When the fault struck, s.
     struck: Option<f64>,
+    /// For how long after that its speed does not count, s.
+    hurry: f64,
     after: After,
     /// How much was jammed, s.
     jammed: f64,
@@ -212,8 +223,9 @@ impl Watched {
         let rival = machine.rivals().find(|(phase, _)| matches!(*phase, "fly" | "approach"));
         let rival = rival.map(|(phase, _)| phase);
         // On the way to the start it may fly as fast as it can.
-        if self.flight.began().is_some_and(|began| now > began.seconds() + 2.0) && now == self.flown && self.is_clean
-        {
+        let is_on_plan = self.flight.began().is_some_and(|began| now > began.seconds() + 2.0) && now == self.flown;
+        let hurries = self.struck.is_some_and(|struck| now < struck + self.hurry);
+        if is_on_plan && self.is_clean && !hurries {
             self.speed = self.speed.max(east.hypot(north));
         }
         if let Some(phase) = rival {
@@ -264,9 +276,10 @@ pub fn fly(trial: &Trial, mode: FlyMode, seed: u64) -> Flown {
     let goal = setup.scenario.agents[0].goal.clone();
     let (unit, budget) = (setup.scenario.frame.unit_m, setup.scenario.agents[0].jammer.expect("a jammer").budget);
     let flight = Rehearsal::new(setup).unwrap_or_else(|error| panic!("{error}"));
-    let (flown, struck, after, jammed, speed) = (0.0, None, trial.after, 0.0, 0.0);
+    let (flown, struck, hurry, after) = (0.0, None, trial.hurry_s, trial.after);
+    let (jammed, speed) = (0.0, 0.0);
     let (broken, said) = (Vec::new(), Vec::new());
-    let mut watched = Watched { flight, frame, flown, struck, after, jammed, speed, is_clean, broken, said };
+    let mut watched = Watched { flight, frame, flown, struck, hurry, after, jammed, speed, is_clean, broken, said };
     while watched.flight.end().is_none() && !watched.has_timed_out() {
         watched.step();
         let now = watched.flight.now().seconds();

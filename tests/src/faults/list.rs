@@ -29,12 +29,6 @@ fn window(flight: &Rehearsal, span: Duration) -> (Time, Time) {
     (flight.now(), flight.now() + span)
 }
 
-/// Sets the vehicle's own limit of speed, as `docs/bridge.md` says: one that could be faster than its plans hurries after
-/// them when it has heard no setpoints for a while.
-fn bound(setup: &mut Setup) {
-    setup.autopilot.limits.speed_max *= 0.525;
-}
-
 fn silence(flight: &mut Rehearsal, span: Duration) {
     let (from, until) = window(flight, span);
     flight.machine_mut().befall(Trouble::Silence { from, until });
@@ -148,8 +142,8 @@ fn on_the_wire() -> Vec<Fault> {
             "the link carries nothing for up to 0.9 s",
             both(Arrives),
             Trial {
-                prepare: |setup, _| bound(setup),
                 strike: |flight, around| silence(flight, seconds(&mut around.random, 0.2, 0.9)),
+                hurry_s: 4.0,
                 ..Trial::NONE
             },
         ),
@@ -168,8 +162,9 @@ fn of_the_vehicle() -> Vec<Fault> {
             "autopilot-restart",
             "the autopilot begins anew in flight",
             both(Arrives),
+            // One that could be faster than its plans hurries after them.
             Trial {
-                prepare: |setup, _| bound(setup),
+                prepare: |setup, _| setup.autopilot.limits.speed_max *= 0.525,
                 strike: |flight, _| flight.machine_mut().restart(),
                 ..Trial::NONE
             },
