@@ -1,7 +1,7 @@
 //! Scenarios are planned feasibly, with claims that hold, and as well as the reference.
 
 use quietpath_bridge::file::PlanFile;
-use quietpath_bridge::planning::{Assessment, Options, Planned, Precision, Rollout, Status, assess, plan};
+use quietpath_bridge::planning::{Assessment, Options, Planned, Precision, Rollout, Status, assess, improve, plan};
 use quietpath_tests::figures::references;
 use quietpath_tests::instances::instance;
 use quietpath_tests::scenario;
@@ -107,4 +107,27 @@ fn a_late_way_is_found_where_there_is_none_in_time() {
     let planned = plan(&scenario, &Options::default()).expect("planned");
     assert!(planned.assessment.feasible, "{:?}", planned.status);
     assert!(planned.plan.duration > scenario.time.target, "there is no way in time");
+}
+
+#[test]
+fn a_plan_that_touches_a_region_is_not_made_worse() {
+    // To improve it, it is led away from the region first.
+    for index in [0, 17, 40] {
+        let scenario = instance(4, index).scenario();
+        let planned = plan(&scenario, &Options::default()).expect("a made-up scenario can be planned");
+        assert!(planned.assessment.feasible, "instance {index}");
+        let again = improve(&scenario, &planned.plan, &Options::default()).expect("its own plan fits");
+        let (before, after) = (planned.assessment.objective, again.assessment.objective);
+        assert!(again.assessment.feasible, "instance {index}");
+        assert!(relative(after, before) < 1e-9, "instance {index}: {before} became {after}");
+    }
+}
+
+#[test]
+fn the_flight_time_is_found_beyond_an_instant_at_which_terms_change() {
+    // The best known plan takes 70.3 s; at 75.3 s one node less is before the instant.
+    let scenario = instance(11, 95).scenario();
+    let planned = plan(&scenario, &Options::default()).expect("a made-up scenario can be planned");
+    assert!(planned.assessment.feasible);
+    assert!(planned.assessment.objective < 30.7, "{} at {} s", planned.assessment.objective, planned.plan.duration);
 }

@@ -49,7 +49,11 @@ impl<T: Real> Settings<T> {
     pub const fn bounds_everywhere(&self, agents: usize) -> Bounds {
         let short = self.improvement(
             smaller(self.iterations, race::POLISH_ITERATIONS),
-            smaller(self.refinements, race::POLISH_REFINEMENTS),
+            if self.refinements > race::POLISH_REFINEMENTS {
+                race::POLISH_REFINEMENTS + race::PATIENCE
+            } else {
+                self.refinements
+            },
         );
         let long = self.improvement(self.iterations, self.refinements);
         let hurried = smaller(if self.variants == 0 { 1 } else { self.variants }, VARIANTS_MAX);

@@ -54,6 +54,7 @@ pub use settings::Settings;
 pub use start::Start;
 pub use workspace::Workspace;
 
+use crate::constraints;
 use crate::error::{Error, Fault, Item};
 use crate::math::Real;
 use crate::objective::{self, Extreme};
@@ -165,6 +166,7 @@ where
         barrier: T::zero(),
         first: T::one(),
         times: Times::Free,
+        patience: 0,
         keeps: Keeps::Better,
     };
     let (status, closing) = if !first.finite() {
@@ -172,7 +174,7 @@ where
     } else if matches!(start, Start::Global) {
         global::search(scenario, settings, workspace, &mut ledger, deadline)
     } else {
-        (improve(scenario, settings, workspace, &mut ledger, deadline), None)
+        (improve_given(scenario, settings, workspace, &mut ledger, deadline), None)
     };
     let obstacle = if status == Status::Infeasible {
         closing.or_else(|| Obstacle::along(scenario, &workspace.best, &mut workspace.scratch))
@@ -189,6 +191,30 @@ where
         evaluations: ledger.evaluations,
         projection_steps: ledger.projection_steps,
     })
+}
+
+/// [`improve`], where the plan there is stays if it is feasible and nothing better comes of it: one that touches a region or
+/// a limit is led away from there first, and may end in another basin.
+fn improve_given<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> Status
+where
+    T: Real,
+{
+    let given = ledger.best;
+    workspace.base.assign(&workspace.best);
+    let found = constraints::violations(scenario, &workspace.base, &mut workspace.scratch);
+    let status = improve(scenario, settings, workspace, ledger, deadline);
+    if ledger.best <= given || found.worst().1 > T::real(constraints::TOLERANCE) {
+        return status;
+    }
+    workspace.best.assign(&workspace.base);
+    ledger.best = given;
+    if matches!(status, Status::Deadline | Status::IterationLimit) { status } else { Status::Stalled }
 }
 
 /// Improves `workspace.best` inside its basin: projected gradient, then refinement. `ledger.best` becomes its
@@ -225,6 +251,8 @@ struct Ledger<T> {
     /// a barrier draws towards their middle.
     first: T,
     times: Times,
+    /// Steps that a refinement takes beyond its limit while it has gained nothing.
+    patience: usize,
     keeps: Keeps,
 }
 

@@ -155,9 +155,26 @@ pub(super) fn change_side<T: Real, const DIM: usize, const NODES: usize, const A
     true
 }
 
-/// Flight times, the nearest shorter and longer ones, at which one node more or less is before an instant at which terms
-/// change, s.
+/// Flight times, shorter and longer ones, at which one node more or less is before an instant at which terms change, s: half
+/// way to where the next node is. A path that has just crossed would be brought back by the projection, which may take longer.
 pub(super) fn other_times<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T) -> Vec<T, TIMES_MAX> {
+    crossings(scenario, duration, T::real(0.5))
+}
+
+/// The shortest and the longest flight time around `duration` at which no node crosses an instant at which terms change, s;
+/// `None` where there is no such instant on that side.
+pub(super) fn piece<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T) -> [Option<T>; 2] {
+    let edges = crossings(scenario, duration, T::zero());
+    let shortest = edges.iter().copied().filter(|time| *time < duration).reduce(T::max);
+    let longest = edges.iter().copied().filter(|time| *time > duration).reduce(T::min);
+    // What is known is on the other side of the instants.
+    let (above, below) = (T::real(1.0 + 2.0 * PAST), T::real(1.0 - 2.0 * PAST));
+    [shortest.map(|time| time * above), longest.map(|time| time * below)]
+}
+
+/// Flight times at which a node has crossed an instant at which terms change, and is `beyond` it by a part of the way to the
+/// node after, s; shorter and longer ones, one of each an instant.
+fn crossings<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T, beyond: T) -> Vec<T, TIMES_MAX> {
     let mut times = Vec::new();
     let count = T::from_count(scenario.frame.intervals.max(1));
     let start = scenario.frame.start_time;
@@ -168,8 +185,8 @@ pub(super) fn other_times<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>
             continue;
         }
         let before = place.floor();
-        let longer = (instant - start) * count / before * T::real(1.0 + PAST);
-        let shorter = (instant - start) * count / (before + T::one()) * T::real(1.0 - PAST);
+        let longer = (instant - start) * count / (before - beyond) * T::real(1.0 + PAST);
+        let shorter = (instant - start) * count / (before + T::one() + beyond) * T::real(1.0 - PAST);
         for time in [shorter, longer] {
             let is_known = times.iter().any(|known: &T| (*known - time).abs() <= time * T::real(PAST));
             if !is_known {
@@ -180,20 +197,12 @@ pub(super) fn other_times<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>
     times
 }
 
-/// The shortest and the longest flight time around `duration` at which no node crosses an instant at which terms change, s;
-/// `None` where there is no such instant on that side.
-pub(super) fn piece<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>, duration: T) -> [Option<T>; 2] {
-    let others = other_times(scenario, duration);
-    let shortest = others.iter().copied().filter(|time| *time < duration).reduce(T::max);
-    let longest = others.iter().copied().filter(|time| *time > duration).reduce(T::min);
-    // What is known is on the other side of the instants.
-    let (above, below) = (T::real(1.0 + 2.0 * PAST), T::real(1.0 - 2.0 * PAST));
-    [shortest.map(|time| time * above), longest.map(|time| time * below)]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::{
+        AgentSet, Domain, Draft, Metric, Pooling, Reduce, ReferencePoint, Scenario, Sense, Term, Timing,
+    };
 
     #[test]
     fn the_nearest_are_kept_in_order() {
@@ -203,5 +212,56 @@ mod tests {
         }
         let rooms: std::vec::Vec<f64> = all.iter().map(|passed| passed.room).collect();
         assert_eq!(rooms, [0.5, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    }
+
+    /// Ten intervals, and a term that ends at 4.5 s.
+    fn until(instant: f64) -> Scenario<f64, 2, 1, 1, 0> {
+        let agent = crate::scenario::Agent {
+            start: Point::<f64, 2>::new(0.0, 0.0),
+            goal: Point::<f64, 2>::new(8.0, 0.0),
+            start_velocity: None,
+            speed_max: 10.0,
+            accel_max: 100.0,
+            weight: 1.0,
+            jammer: None,
+            dropout: None,
+        };
+        let term = Term {
+            metric: Metric::Detection,
+            sense: Sense::Minimize,
+            reduce: Reduce::Integral,
+            weight: 1.0,
+            agents: AgentSet::ALL,
+            window: Window { from: -f64::INFINITY, until: instant },
+        };
+        Scenario::new(&Draft {
+            softening: 1e-3,
+            reference_point: ReferencePoint::Current,
+            intervals: 10,
+            start_time: 0.0,
+            time: Timing { max: 20.0, target: 0.0, penalty: 0.0 },
+            domain: Domain { min: Point::<f64, 2>::new(-1.0, -1.0), max: Point::<f64, 2>::new(9.0, 9.0) },
+            separation: None,
+            agents: &[agent],
+            sensors: &[],
+            terms: &[term],
+            pooling: Pooling::None,
+            regions: &[],
+            limits: &[],
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn other_times_are_half_way_into_the_pieces_beside() {
+        let scenario = until(4.5);
+        let view = scenario.view();
+        // Node 4 is before the instant and node 5 after it from 9 s to 11.25 s.
+        let [shortest, longest] = piece(&view, 10.0).map(Option::unwrap);
+        assert!((shortest - 9.0).abs() < 1e-4 && (longest - 11.25).abs() < 1e-4, "{shortest} to {longest} s");
+        let [shorter, longer] = *other_times(&view, 10.0) else { panic!("two times") };
+        assert!((shorter - 45.0 / 5.5).abs() < 1e-4 && (longer - 45.0 / 3.5).abs() < 1e-4, "{shorter}, {longer} s");
+        let [_, edge] = piece(&view, shorter * 1.01);
+        assert!(edge.is_some_and(|edge| edge < shortest), "a little slower is still beyond: {edge:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! The race of candidates: each is polished for a few iterations, the best is challenged, and the best two are polished to
 //! the end.
 //!
-//! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`] a candidate; one second; two ways are alike where they are side by
+//! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`], and at most [`PATIENCE`] more, a candidate; one second; two ways are alike where they are side by
 //! side, with levels in about the same places.
 
 use crate::math::{Real, norm};
@@ -17,6 +17,9 @@ use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbou
 pub(super) const POLISH_ITERATIONS: usize = 12;
 /// Refinement steps of one candidate.
 pub(super) const POLISH_REFINEMENTS: usize = 10;
+/// Steps that a candidate has beyond these while it is no better than it was laid: what draws it inside its bounds makes it
+/// worse at first, and one that was stopped there would be compared by what it was laid with.
+pub(super) const PATIENCE: usize = 15;
 /// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
 const SECOND_CHANCE: f64 = 2.0;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
@@ -129,12 +132,15 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) {
+        let is_large = self.is_large();
         let Self { scenario, settings, found, .. } = self;
         let short = Settings { iterations, refinements: settings.refinements.min(POLISH_REFINEMENTS), ..**settings };
         ledger.barrier = T::zero();
         ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
         ledger.evaluations += 1;
+        ledger.patience = if settings.refinements > POLISH_REFINEMENTS && !is_large { PATIENCE } else { 0 };
         let status = polish(scenario, &short, workspace, ledger, deadline);
+        ledger.patience = 0;
         let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
         let level = if is_alike { found.level } else { ledger.best };
         let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };

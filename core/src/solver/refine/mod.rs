@@ -11,7 +11,10 @@
 //! | g, lambda | slack, multiplier |
 //! | delta | `shift`: multiple of the metric that makes an indefinite system definite |
 //!
-//! Limits: [`Settings::refinements`] steps; local, from the basin of its start; not used where a scenario has more
+//! The objective jumps where a node crosses an instant at which terms change. A step that would take the flight time across is
+//! cut short again and again; after two, the flight time is held between its jumps.
+//!
+//! Limits: [`Settings::refinements`] steps, and a few more for a candidate of the race; local, from the basin of its start; not used where a scenario has more
 //! than two worst-case terms an agent.
 
 mod assemble;
@@ -57,6 +60,8 @@ pub(super) const SHIFTS_MAX: usize = 24;
 pub(super) const HALVINGS_MAX: usize = 25;
 /// Multipliers stay within this factor of mu / g.
 const MULTIPLIER_RANGE: f64 = 1e8;
+/// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
+const HELD_UP: (f64, usize) = (0.05, 2);
 
 /// One for each agent; none where nothing is refined.
 #[cfg(not(feature = "first-order"))]
@@ -122,8 +127,9 @@ where
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
         pace_multipliers: [T::zero(); 2],
         shift: T::zero(),
+        times: ledger.times,
     };
-    let status = path.follow(workspace, ledger, deadline);
+    let status = path.follow_through(workspace, ledger, deadline);
     ledger.barrier = path.barrier;
     Some(status)
 }
@@ -202,6 +208,16 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     /// Of the smallest and of the largest pace.
     pace_multipliers: [T; 2],
     shift: T,
+    times: Times,
+}
+
+/// How far a refinement came.
+enum Followed {
+    To(Status),
+    /// To an instant at which terms change, where the objective jumps; so many steps are left.
+    HeldUp {
+        left: usize,
+    },
 }
 
 /// A step of everything that is not in the iterate.
@@ -212,38 +228,87 @@ struct Move<T, const AGENTS: usize> {
 }
 
 impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGENTS> {
-    fn follow<const NODES: usize, const SENSORS: usize>(
+    /// Follows the path to the end; where an instant at which terms change holds it up, at flight times at which no node
+    /// crosses one.
+    fn follow_through<const NODES: usize, const SENSORS: usize>(
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
+        let steps = self.settings.refinements;
+        let left = match self.follow(steps, workspace, ledger, deadline) {
+            Followed::To(status) => return status,
+            Followed::HeldUp { left } => left,
+        };
+        let mut held = *self.frame;
+        held.hold(neighbours::piece(self.scenario, self.frame.duration(workspace.iterate.pace)));
+        // At the very instant there is no room on one side.
+        let is_inside = held.pace_slacks(workspace.iterate.pace).into_iter().flatten().all(|slack| slack > T::zero());
+        let mut rest = CentralPath {
+            frame: if is_inside { &held } else { self.frame },
+            extremes: self.extremes.clone(),
+            times: Times::Held,
+            ..*self
+        };
+        let followed = rest.follow(left, workspace, ledger, deadline);
+        self.barrier = rest.barrier;
+        match followed {
+            Followed::To(status) => status,
+            Followed::HeldUp { .. } => Status::Stalled,
+        }
+    }
+
+    fn follow<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        steps: usize,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) -> Followed {
         self.reset_multipliers(workspace);
         self.weigh(workspace);
         ledger.evaluations += 1;
-        for _ in 0..self.settings.refinements {
+        let known = ledger.best;
+        let mut short = 0;
+        for step in 0..steps + ledger.patience {
+            if step >= steps && ledger.best < known {
+                break;
+            }
             if deadline() {
-                return Status::Deadline;
+                return Followed::To(Status::Deadline);
             }
             ledger.refinements += 1;
-            let Some(step) = self.newton(workspace, ledger) else { return Status::Stalled };
-            let is_centered = -step.slope <= T::real(CENTERED) * self.barrier;
-            let Some(share) = self.advance(&step, workspace, ledger) else {
+            let Some(newton) = self.newton(workspace, ledger) else { return Followed::To(Status::Stalled) };
+            let is_centered = -newton.slope <= T::real(CENTERED) * self.barrier;
+            let Some(share) = self.advance(&newton, workspace, ledger) else {
                 if self.barrier <= self.barrier_last {
-                    return Status::Converged;
+                    return Followed::To(Status::Converged);
                 }
                 self.frame.expand(&workspace.iterate, &mut workspace.trial);
                 self.lower_barrier();
                 continue;
             };
+            short = if share < T::real(HELD_UP.0) { short + 1 } else { 0 };
+            if short >= HELD_UP.1 && self.may_be_held_up(workspace.iterate.pace) {
+                let taken = step + 1;
+                ledger.patience = ledger.patience.min(steps + ledger.patience - taken);
+                return Followed::HeldUp { left: steps.saturating_sub(taken) };
+            }
             if is_centered && share > T::real(0.5) {
                 if self.barrier <= self.barrier_last {
-                    return Status::Converged;
+                    return Followed::To(Status::Converged);
                 }
                 self.lower_barrier();
             }
         }
-        Status::IterationLimit
+        Followed::To(Status::IterationLimit)
+    }
+
+    /// Whether there is an instant at which terms change that nodes may cross.
+    fn may_be_held_up(&self, pace: T) -> bool {
+        self.times == Times::Free
+            && neighbours::piece(self.scenario, self.frame.duration(pace)).iter().any(Option::is_some)
     }
 
     fn lower_barrier(&mut self) {
