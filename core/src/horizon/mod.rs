@@ -49,8 +49,8 @@ use crate::trajectory::Trajectory;
 
 use outlook::Outlook;
 
-/// Projected-gradient iterations of a step before its plan is refined: it has to bring the tail clear of what came too near,
-/// and the refinement does the rest.
+/// Projected-gradient iterations of a step before its plan is refined, where it has to bring the tail clear of what came too
+/// near; a tail that is clear is refined as it is.
 pub const NEAR_ITERATIONS: usize = 4;
 /// Part of a budget below which what is left of it counts as nothing, or as many rounding units if they are more.
 const NOTHING_LEFT: f64 = 1e-9;

@@ -56,6 +56,7 @@ pub use workspace::Workspace;
 
 use crate::constraints;
 use crate::error::{Error, Fault, Item};
+use crate::horizon::NEAR_ITERATIONS;
 use crate::math::Real;
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
@@ -193,8 +194,10 @@ where
     })
 }
 
-/// [`improve`], where the plan there is stays if it is feasible and nothing better comes of it: one that touches a region or
-/// a limit is led away from there first, and may end in another basin.
+/// [`improve`] for a plan that was given: it stays where it is feasible and nothing better comes of it.
+///
+/// With so few iterations as a plan nearby needs, one that is clear of regions and limits is refined as it is. One that all
+/// but touches them is led away first, as the refinement is slow where it begins at its bounds, and may end in another basin.
 fn improve_given<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
@@ -207,8 +210,14 @@ where
 {
     let given = ledger.best;
     workspace.base.assign(&workspace.best);
+    let slack = guard::smallest_slack(scenario, &workspace.base, &mut workspace.scratch);
+    let is_nearby = settings.iterations <= NEAR_ITERATIONS && slack >= T::real(projected_gradient::CLEAR_ENOUGH);
+    let status = if is_nearby {
+        race::polish(scenario, settings, workspace, ledger, deadline)
+    } else {
+        improve(scenario, settings, workspace, ledger, deadline)
+    };
     let found = constraints::violations(scenario, &workspace.base, &mut workspace.scratch);
-    let status = improve(scenario, settings, workspace, ledger, deadline);
     if ledger.best <= given || found.worst().1 > T::real(constraints::TOLERANCE) {
         return status;
     }

@@ -31,6 +31,8 @@ pub(super) const STAGES_MAX: usize = SHARPNESS.len();
 const BARRIER: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 /// Slack of regions and limits that a restored start has.
 const CLEAR: f64 = 1e-2;
+/// Slack with which a start is not restored.
+pub(super) const CLEAR_ENOUGH: f64 = CLEAR * 0.5;
 /// Bounds on the spectral step, relative to the first.
 const STEP_RANGE: f64 = 1e8;
 /// The first step moves velocities by about this part of the largest speed.
@@ -126,7 +128,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
         deadline: &mut dyn FnMut() -> bool,
     ) -> Option<Status> {
         let margin = T::real(CLEAR);
-        if guard::smallest_slack(self.scenario, &workspace.best, &mut workspace.scratch) >= margin * T::real(0.5) {
+        if guard::smallest_slack(self.scenario, &workspace.best, &mut workspace.scratch) >= T::real(CLEAR_ENOUGH) {
             return None;
         }
         let penalty = Guard::Penalty { weight: T::one(), margin };

@@ -1,8 +1,10 @@
 //! The race of candidates: each is polished for a few iterations, the best is challenged, and the best two are polished to
 //! the end.
 //!
-//! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`], and at most [`PATIENCE`] more, a candidate; one second; two ways are alike where they are side by
-//! side, with levels in about the same places.
+//! Limits: [`POLISH_ITERATIONS`] or [`POLISH_REFINEMENTS`], and at most [`PATIENCE`] more, a candidate; one second; two ways
+//! are alike where they are side by side, with levels in about the same places.
+
+use heapless::Vec;
 
 use crate::math::{Real, norm};
 use crate::objective::{self, Extreme};
@@ -30,6 +32,8 @@ const ANEW: f64 = 0.01;
 const ELSEWHERE: f64 = 0.1;
 /// Times that a plan moves on to another flight time at which other nodes are before an instant.
 pub(super) const RETIMES_MAX: usize = 4;
+/// Lattice paths polished that are remembered.
+const KNOWN_MAX: usize = 16;
 /// Largest distance of two paths that go the same way, over their length.
 const ALIKE: f64 = 0.04;
 /// Largest difference of their levels, over the larger ones.
@@ -78,6 +82,9 @@ pub(super) struct Race<'a, T, const DIM: usize> {
     ways: Ways,
     /// Least objective of all that were laid, before they were polished.
     promise: T,
+    /// Objectives of those that were polished, as they were laid: what has one of them to the last bit is the same once more,
+    /// as where two flight times or two orders of a team come out alike.
+    known: Vec<T, KNOWN_MAX>,
     /// Lattice paths polished.
     pub(super) polished: usize,
     /// Lattice paths in a row that brought nothing.
@@ -95,13 +102,14 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
             second: none,
             ways: Ways::All,
             promise: T::INFINITY,
+            known: Vec::new(),
             polished: 0,
             idle: 0,
         }
     }
 
-    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, and does not
-    /// go where the champion goes.
+    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, was not
+    /// polished before, and does not go where the champion goes.
     pub(super) fn admits<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
         &mut self,
         objective: T,
@@ -109,9 +117,14 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
     ) -> bool {
         let is_record = objective < self.promise;
         self.promise = self.promise.min(objective);
-        let is_known = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
+        let is_alike = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
+        let is_known = is_alike || self.known.contains(&objective);
         let admits = (is_record || self.polished < self.settings.candidates) && !is_known;
-        self.polished += usize::from(admits);
+        if admits {
+            self.polished += 1;
+            // One that is not remembered may be polished twice.
+            let _ = self.known.push(objective);
+        }
         admits
     }
 
@@ -395,7 +408,7 @@ pub(super) fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS
 
 /// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
 /// from a lattice path, and led by the projected gradient otherwise.
-fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+pub(super) fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,

@@ -11,11 +11,11 @@
 //! | g, lambda | slack, multiplier |
 //! | delta | `shift`: multiple of the metric that makes an indefinite system definite |
 //!
-//! The objective jumps where a node crosses an instant at which terms change. A step that would take the flight time across is
-//! cut short again and again; after two, the flight time is held between its jumps.
+//! The objective jumps where a node crosses an instant at which terms change. A step that would take the flight time across
+//! is cut short again and again; after two, the flight time is held between its jumps.
 //!
-//! Limits: [`Settings::refinements`] steps, and a few more for a candidate of the race; local, from the basin of its start; not used where a scenario has more
-//! than two worst-case terms an agent.
+//! Limits: [`Settings::refinements`] steps, and a few more for a candidate of the race; local, from the basin of its start;
+//! not used where a scenario has more than two worst-case terms an agent.
 
 mod assemble;
 mod barrier;
