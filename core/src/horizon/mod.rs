@@ -13,9 +13,10 @@
 //! - Steps drop the nodes that were flown and keep the interval, so that the tail is a plan of the rest as it stands. It
 //!   is where a step starts from, and what stays in force if the step finds nothing better: a flight is feasible from
 //!   beginning to end wherever its first plan is and the world does not close the way.
-//! - The tail is as good a start as its world has not changed. So a step refines it after a few projected-gradient
-//!   iterations, [`NEAR_ITERATIONS`], which costs a small part of the first step; where that finds no feasible plan, it takes
-//!   as many as the settings allow, and then searches everywhere.
+//! - The tail is as good a start as its world has not changed. So a step refines it: as it is where it is clear of regions and
+//!   limits and the settings allow a refinement of its own, and after a few projected-gradient iterations, [`NEAR_ITERATIONS`],
+//!   otherwise. Either costs a small part of the first step; where no feasible plan is found, it takes as many as the settings
+//!   allow, and then searches everywhere.
 //! - Each step may choose another flight time, and so another interval. At the seam, the change of velocity counts over
 //!   the mean of the intervals on both sides: |v_1 - v_0| <= a (h_0 + h) / 2, as everywhere in the path that was flown.
 //! - Budgets are those of the whole flight; what was flown is taken off them.
