@@ -91,8 +91,9 @@ impl<T: Real> Settings<T> {
             iterations: descended,
             refinements,
             factorizations: refinements * refine::SHIFTS_MAX,
-            // Its value for either, the first gradient of every stage, then a line search each, and each success judged exactly.
-            evaluations: 2
+            // Its value for either, and for a refinement once more where an instant holds it up; the first gradient of every
+            // stage, then a line search each, and each success judged exactly.
+            evaluations: 3
                 + (1 + projected_gradient::STAGES_MAX)
                 + descended * (self.line_search_steps + 1)
                 + refinements * (refine::HALVINGS_MAX + 1),

@@ -217,8 +217,8 @@ where
     } else {
         improve(scenario, settings, workspace, ledger, deadline)
     };
-    let found = constraints::violations(scenario, &workspace.base, &mut workspace.scratch);
-    if ledger.best <= given || found.worst().1 > T::real(constraints::TOLERANCE) {
+    if ledger.best <= given || !constraints::violations(scenario, &workspace.base, &mut workspace.scratch).feasible()
+    {
         return status;
     }
     workspace.best.assign(&workspace.base);
