@@ -166,6 +166,7 @@ where
         projection_steps: 0,
         barrier: T::zero(),
         first: T::one(),
+        inside: T::one(),
         times: Times::Free,
         patience: 0,
         keeps: Keeps::Better,
@@ -194,6 +195,11 @@ where
     })
 }
 
+/// Parts of the usual first barrier parameter, and of the usual way inside its bounds, for a plan that was given and is near:
+/// the further it is drawn from its bounds, the more of it has to be found again.
+const NEAR_BARRIER: f64 = 0.1;
+const NEAR_INSIDE: f64 = 0.1;
+
 /// [`improve`] for a plan that was given: it stays where it is feasible and nothing better comes of it.
 ///
 /// With so few iterations as a plan nearby needs, one that is clear of regions and limits is refined as it is. One that all
@@ -213,6 +219,7 @@ where
     let slack = guard::smallest_slack(scenario, &workspace.base, &mut workspace.scratch);
     let is_nearby = settings.iterations <= NEAR_ITERATIONS && slack >= T::real(projected_gradient::CLEAR_ENOUGH);
     let status = if is_nearby {
+        (ledger.first, ledger.inside) = (T::real(NEAR_BARRIER), T::real(NEAR_INSIDE));
         race::polish(scenario, settings, workspace, ledger, deadline)
     } else {
         improve(scenario, settings, workspace, ledger, deadline)
@@ -259,6 +266,8 @@ struct Ledger<T> {
     /// Part of the usual first barrier parameter that a refinement begins with: less where levels have been laid, which
     /// a barrier draws towards their middle.
     first: T,
+    /// Part of the usual way inside its bounds that a plan is drawn before it is refined.
+    inside: T,
     times: Times,
     /// Steps that a refinement takes beyond its limit while it has gained nothing.
     patience: usize,

@@ -77,7 +77,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let intervals = self.frame.intervals;
         for_each_ball(self.frame, agent, offsets, self.iterate.pace, |place, ball| {
             let multiplier = multipliers.of_ball(place, intervals).copied().unwrap_or_default();
-            add_ball(ball, multiplier, self.barrier, system);
+            add_ball(ball, multiplier, system);
         });
     }
 
@@ -96,7 +96,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
                 .and_then(|side| side.get(wall.node))
                 .map_or(T::zero(), |point| point.get(wall.component).copied().unwrap_or_default());
             let stiffness = multiplier / wall.slack;
-            let push = self.barrier / wall.slack;
+            let push = T::one() / wall.slack;
             let (by_offset, by_pace) = (wall.by_offset, wall.by_pace);
             let Some(row) = system.rows.get_mut(wall.node) else { return };
             if let Some(entry) = row.here.get_mut((wall.component, wall.component)) {
@@ -109,8 +109,8 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             };
             component(system.columns[PACE].path.get_mut(wall.node), stiffness * by_offset * by_pace);
             system.border[PACE][PACE] += stiffness * by_pace * by_pace;
-            component(system.right.path.get_mut(wall.node), push * by_offset);
-            system.border_right[PACE] += push * by_pace;
+            component(system.centre.path.get_mut(wall.node), push * by_offset);
+            system.border_centre[PACE] += push * by_pace;
         });
     }
 
@@ -121,7 +121,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         multipliers: &Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
     ) {
-        let (one, barrier) = (T::one(), self.barrier);
+        let one = T::one();
         for (kind, bound) in Kind::ALL.into_iter().zip(agent.controls) {
             let Bound::Level { allowance } = bound else { continue };
             let column = BUDGETS + usize::from(kind == Kind::Dropout);
@@ -132,16 +132,16 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let [low, high] = &multipliers.level;
             let sides = low[kind_index].iter().zip(&high[kind_index]);
             let nodes =
-                system.local.iter_mut().zip(&mut system.right.control).zip(&mut system.columns[column].control);
+                system.local.iter_mut().zip(&mut system.centre.control).zip(&mut system.columns[column].control);
             for ((((local, right), border), &level), (&low, &high)) in nodes.zip(levels).zip(sides) {
                 local.matrix[kind_index][kind_index] += low / level + high / (one - level);
-                right[kind_index] += barrier / level - barrier / (one - level) - barrier / rest;
+                right[kind_index] += one / level - one / (one - level) - one / rest;
                 border[kind_index] = -one;
             }
             system.border[column][PACE] = allowance;
             system.border[PACE][column] = allowance;
             system.border[column][column] = -rest / multipliers.budget[kind_index];
-            system.border_right[PACE] += barrier * allowance / rest;
+            system.border_centre[PACE] += allowance / rest;
         }
     }
 
@@ -183,14 +183,14 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let integrals = Integrals { scenario, time };
         let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &integrals, scratch);
         let jet = self.shared(jet, at);
-        place.add_slopes(&jet, self.frame.interval / self.iterate.pace, system);
+        place.add_slopes(&jet, self.frame.interval / self.iterate.pace, Target::Objective, system);
         place.add(&jet, self.frame.interval / self.iterate.pace, Share::Integral, system);
         if !scenario.limits.is_empty() {
-            let limits = Limits { scenario, barrier: self.barrier };
+            let limits = Limits { scenario };
             let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &limits, scratch);
             let jet = self.shared(jet, at);
-            place.add_slopes(&jet, T::one(), system);
-            place.add(&jet, T::one(), Share::Node, system);
+            place.add_slopes(&jet, T::one(), Target::Centre, system);
+            place.add(&jet, self.barrier, Share::Node, system);
         }
         for worst in self.extremes.of(agent).filter(|worst| worst.term.window.holds(time)) {
             let own = Single { agent, metric: worst.term.metric };
@@ -200,7 +200,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let slot = worst.slot;
             let multiplier =
                 multipliers.extreme.get(slot).and_then(|nodes| nodes.get(node - 1)).copied().unwrap_or_default();
-            place.add_worst(&jet, sign, (slack, multiplier, self.barrier), EXTREMES + slot, system);
+            place.add_worst(&jet, sign, (slack, multiplier), EXTREMES + slot, system);
         }
     }
 
@@ -251,7 +251,6 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
 fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
     ball: &Ball<T, DIM>,
     multiplier: T,
-    barrier: T,
     system: &mut System<T, DIM, NODES>,
 ) {
     let (two, four) = (T::real(2.0), T::real(4.0));
@@ -264,13 +263,13 @@ fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
     let by_radius = ball.value * (-four * multiplier * ball.radius * ball.radius_by_pace / slack);
     let along_pace = bend * ball.by_pace + by_radius;
     let radial = two * multiplier * ball.radius_by_pace * ball.radius_by_pace;
-    let push = two * barrier / slack;
+    let push = two / slack;
     system.border[PACE][PACE] += ball.by_pace.dot(&(along_pace + by_radius))
         + radial * (ball.radius * ball.radius + norm_squared(&ball.value)) / slack;
-    system.border_right[PACE] += push * ball.half_slack_by_pace();
+    system.border_centre[PACE] += push * ball.half_slack_by_pace();
     for (a, &weight_a) in ball.weights.iter().enumerate() {
         let Some(row) = index(ball.first, a).filter(|&row| row < interior && weight_a != T::zero()) else { continue };
-        let [column, right] = [&mut system.columns[PACE], &mut system.right];
+        let [column, right] = [&mut system.columns[PACE], &mut system.centre];
         let Some((column, right)) = column.path.get_mut(row).zip(right.path.get_mut(row)) else { continue };
         *column += along_pace * weight_a;
         *right -= ball.value * (push * weight_a);
@@ -305,6 +304,15 @@ enum Share {
     Integral,
     /// As it is.
     Node,
+}
+
+/// Which right-hand side a gradient goes to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Target {
+    /// That of the objective.
+    Objective,
+    /// That of the barriers, which the barrier parameter multiplies.
+    Centre,
 }
 
 /// A node's place in the system, and how its variables move with the pace.
@@ -396,14 +404,19 @@ impl<'a, T: Real> Place<'a, T> {
         &self,
         jet: &Jet<T, M>,
         weight: T,
+        target: Target,
         system: &mut System<T, DIM, NODES>,
     ) {
+        let (part, border) = match target {
+            Target::Objective => (&mut system.right, &mut system.border_right),
+            Target::Centre => (&mut system.centre, &mut system.border_centre),
+        };
         let mut along = T::zero();
         for (a, &role) in self.roles.iter().enumerate().take(M) {
             along += jet.gradient[a] * self.along[a];
-            self.add_to_right(role, -weight * self.factor(role) * jet.gradient[a], system);
+            self.add_to_right(role, -weight * self.factor(role) * jet.gradient[a], part);
         }
-        system.border_right[PACE] -= weight * along;
+        border[PACE] -= weight * along;
     }
 
     /// Adds the barrier of one node of a worst value epsilon: slack epsilon - sign E.
@@ -411,13 +424,13 @@ impl<'a, T: Real> Place<'a, T> {
         &self,
         jet: &Jet<T, M>,
         sign: T,
-        (slack, multiplier, barrier): (T, T, T),
+        (slack, multiplier): (T, T),
         column: usize,
         system: &mut System<T, DIM, NODES>,
     ) {
         // Worst values have columns of their own, so that there is one.
         let column = column.min(COLUMNS - 1);
-        let (stiffness, push) = (multiplier / slack, barrier / slack);
+        let (stiffness, push) = (multiplier / slack, T::one() / slack);
         let mut outer = *jet;
         for a in 0..M {
             for b in 0..M {
@@ -432,13 +445,13 @@ impl<'a, T: Real> Place<'a, T> {
             along += jet.gradient[a] * self.along[a];
             self.add_to_column(role, column, -stiffness * sign * jet.gradient[a] * self.factor(role), system);
             // The gradient of -mu ln(epsilon - sign E).
-            self.add_to_right(role, -push * sign * jet.gradient[a] * self.factor(role), system);
+            self.add_to_right(role, -push * sign * jet.gradient[a] * self.factor(role), &mut system.centre);
         }
         system.border[column][column] += stiffness;
         system.border[column][PACE] -= stiffness * sign * along;
         system.border[PACE][column] -= stiffness * sign * along;
-        system.border_right[column] += push;
-        system.border_right[PACE] -= push * sign * along;
+        system.border_centre[column] += push;
+        system.border_centre[PACE] -= push * sign * along;
     }
 
     fn add_pair<const DIM: usize, const NODES: usize>(
@@ -492,9 +505,9 @@ impl<'a, T: Real> Place<'a, T> {
         &self,
         role: Role,
         value: T,
-        system: &mut System<T, DIM, NODES>,
+        part: &mut super::system::Part<T, DIM, NODES>,
     ) {
-        add_to_part(self, role, value, &mut system.right);
+        add_to_part(self, role, value, part);
     }
 }
 
@@ -530,8 +543,8 @@ pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
     (barrier, slack): (T, T),
     by_ends: &[Point<T, DIM>; 2],
 ) {
-    let push = barrier / slack;
-    let stiffness = push / slack;
+    let push = T::one() / slack;
+    let stiffness = barrier * push / slack;
     let interior = system.intervals.saturating_sub(1);
     let [by_from, by_to] = by_ends;
     let zero = Point::<T, DIM>::zeros();
@@ -541,7 +554,7 @@ pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
     let before = if node >= 1 { moved(node - 1) } else { zero };
     let by_pace = by_from.dot(&before) + by_to.dot(&moved(node));
     let (a, b) = (by_from * scale, by_to * scale);
-    let (column, right) = (&mut system.columns[PACE].path, &mut system.right.path);
+    let (column, right) = (&mut system.columns[PACE].path, &mut system.centre.path);
     for (place, by_end) in [(from, a), (to, b)] {
         let Some(place) = place else { continue };
         let Some(((row, border), right)) =
@@ -557,7 +570,7 @@ pub(super) fn add_segment<T: Real, const DIM: usize, const NODES: usize>(
         row.one += b * a.transpose() * stiffness;
     }
     system.border[PACE][PACE] += stiffness * by_pace * by_pace;
-    system.border_right[PACE] += push * by_pace;
+    system.border_centre[PACE] += push * by_pace;
 }
 
 /// Kinds of controls, for the sizes of this module.

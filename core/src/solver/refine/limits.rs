@@ -6,10 +6,9 @@ use crate::objective::curvature::{Slope, Slopes, Weigh};
 use crate::objective::merit::slacks;
 use crate::scenario::View;
 
-/// Barriers of the limits: psi = -mu ln g.
+/// Barriers of the limits: psi = -ln g, without mu.
 pub(super) struct Limits<'a, T, const DIM: usize> {
     pub(super) scenario: &'a View<'a, T, DIM>,
-    pub(super) barrier: T,
 }
 
 impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
@@ -25,7 +24,7 @@ impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
             let Some(value) = values.get(limit.metric) else { continue };
             let (mut first, mut second) = (T::zero(), T::zero());
             for (slack, by_value) in slacks(limit, value).into_iter().flatten() {
-                let push = self.barrier / slack;
+                let push = T::one() / slack;
                 first -= push * by_value;
                 second += push / slack * by_value * by_value;
             }

@@ -11,6 +11,10 @@
 //! | g, lambda | slack, multiplier |
 //! | delta | `shift`: multiple of the metric that makes an indefinite system definite |
 //!
+//! A system's matrix does not depend on the barrier parameter that its step aims at, and the step is linear in it. So mu is
+//! chosen once the system is solved: where its step for the old mu would gain nothing to speak of, the same system gives the
+//! step for a smaller one.
+//!
 //! The objective jumps where a node crosses an instant at which terms change. A step that would take the flight time across
 //! is cut short again and again; after two, the flight time is held between its jumps.
 //!
@@ -38,7 +42,7 @@ use super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours};
 use assemble::Source;
 use barrier::Multipliers;
 use extremes::Extremes;
-use system::{BUDGETS, COLUMNS, Controls, EXTREMES, PACE, System};
+use system::{BUDGETS, COLUMNS, Controls, EXTREMES, PACE, System, products};
 
 /// Part of the pace that a start gives up to come inside its bounds.
 const INSIDE: f64 = 0.02;
@@ -50,6 +54,12 @@ const LAST_BARRIER: f64 = 1e-11;
 const BARRIER_FACTOR: f64 = 0.1;
 /// The barrier parameter falls when a step predicts a decrease of less than this many of it.
 const CENTERED: f64 = 3.0;
+/// It may fall by more than one factor when a step predicts less than this many of it,
+const WELL_CENTERED: f64 = 0.1;
+/// to the least of these parts of it
+const LEAPS: [f64; 2] = [1e-3, 1e-2];
+/// at which bounds leave this much of the step.
+const CLEAR_WAY: f64 = 0.95;
 /// Part of the way to the boundary that a step may go.
 const TO_BOUNDARY: f64 = 0.99;
 /// Part of the predicted decrease that a step must bring.
@@ -107,7 +117,7 @@ where
     let is_inside = ledger.barrier > T::zero()
         && barrier::log_slacks(&frame, &scenario.frame.domain, &workspace.iterate).finite()
         && guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) > T::zero();
-    if !is_inside && !draw_inside(scenario, &frame, workspace) {
+    if !is_inside && !draw_inside(scenario, &frame, workspace, ledger.inside) {
         return None;
     }
     frame.expand(&workspace.iterate, &mut workspace.trial);
@@ -134,18 +144,19 @@ where
     Some(status)
 }
 
-/// Draws the incumbent, in `workspace.iterate`, inside its bounds; false if that fails.
+/// Draws the incumbent, in `workspace.iterate`, inside its bounds by `part` of the usual way; false if that fails.
 fn draw_inside<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     frame: &Frame<T, DIM, AGENTS>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    part: T,
 ) -> bool
 where
     T: Real,
 {
     let domain = &scenario.frame.domain;
     workspace.candidate.assign(&workspace.iterate, frame);
-    let mut inside = T::real(INSIDE);
+    let mut inside = T::real(INSIDE) * part;
     for _ in 0..4 {
         let Workspace { iterate, candidate, trial, scratch, .. } = workspace;
         // The same path, flown a little slower.
@@ -220,6 +231,33 @@ enum Followed {
     },
 }
 
+/// What the solution of a system is besides the agents' parts, as coefficients of 1 and of mu.
+struct Solved<T, const AGENTS: usize> {
+    pace: [T; 2],
+    unknowns: Vec<[[T; COLUMNS]; 2], AGENTS>,
+    /// Minus the predicted change of the merit, as coefficients of 1, mu and mu squared.
+    work: [T; 3],
+}
+
+impl<T: Real, const AGENTS: usize> Solved<T, AGENTS> {
+    /// Predicted change of the merit with a barrier parameter, by the step that aims at it.
+    fn slope(&self, barrier: T) -> T {
+        let [by_step, by_both, by_pull] = self.work;
+        -(by_step + barrier * (by_both + barrier * by_pull))
+    }
+
+    /// The step that aims at a barrier parameter.
+    fn aim(&self, barrier: T) -> Move<T, AGENTS> {
+        let mut step = Move { unknowns: Vec::new(), slope: self.slope(barrier) };
+        for [unknowns, pulls] in &self.unknowns {
+            let mut aimed = *unknowns;
+            aimed.iter_mut().zip(pulls).for_each(|(aimed, &pull)| *aimed += barrier * pull);
+            let _ = step.unknowns.push(aimed);
+        }
+        step
+    }
+}
+
 /// A step of everything that is not in the iterate.
 struct Move<T, const AGENTS: usize> {
     unknowns: Vec<[T; COLUMNS], AGENTS>,
@@ -286,7 +324,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                     return Followed::To(Status::Converged);
                 }
                 self.frame.expand(&workspace.iterate, &mut workspace.trial);
-                self.lower_barrier();
+                self.barrier = self.lower();
                 continue;
             };
             short = if share < T::real(HELD_UP.0) { short + 1 } else { 0 };
@@ -295,11 +333,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 ledger.patience = ledger.patience.min(steps + ledger.patience - taken);
                 return Followed::HeldUp { left: steps.saturating_sub(taken) };
             }
-            if is_centered && share > T::real(0.5) {
-                if self.barrier <= self.barrier_last {
-                    return Followed::To(Status::Converged);
-                }
-                self.lower_barrier();
+            if is_centered && share > T::real(0.5) && self.barrier <= self.barrier_last {
+                return Followed::To(Status::Converged);
             }
         }
         Followed::To(Status::IterationLimit)
@@ -311,8 +346,68 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             && neighbours::piece(self.scenario, self.frame.duration(pace)).iter().any(Option::is_some)
     }
 
-    fn lower_barrier(&mut self) {
-        self.barrier = (self.barrier * T::real(BARRIER_FACTOR)).max(self.barrier_last);
+    /// The next barrier parameter.
+    fn lower(&self) -> T {
+        self.part(BARRIER_FACTOR)
+    }
+
+    /// A part of the barrier parameter, not below the last.
+    fn part(&self, part: f64) -> T {
+        (self.barrier * T::real(part)).max(self.barrier_last)
+    }
+
+    /// The barrier parameter that the step of the system just solved aims at: the one there was, or, where its own step would
+    /// gain nothing to speak of, a smaller one.
+    fn choose<const NODES: usize, const SENSORS: usize>(
+        &self,
+        solved: &Solved<T, AGENTS>,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> T {
+        let predicted = -solved.slope(self.barrier);
+        if predicted > T::real(CENTERED) * self.barrier {
+            return self.barrier;
+        }
+        if predicted <= T::real(WELL_CENTERED) * self.barrier {
+            let domain = &self.scenario.frame.domain;
+            for barrier in LEAPS.map(|part| self.part(part)) {
+                self.lay(solved, barrier, workspace);
+                let Workspace { iterate, candidate, .. } = workspace;
+                let share = largest_share(self.frame, domain, iterate, candidate, iterate.pace)
+                    .min(barrier::level_share(self.frame, iterate, candidate));
+                if share >= T::real(CLEAR_WAY) {
+                    return barrier;
+                }
+            }
+        }
+        self.lower()
+    }
+
+    /// Leaves the iterate plus the whole step for a barrier parameter in `workspace.candidate`.
+    fn lay<const NODES: usize, const SENSORS: usize>(
+        &self,
+        solved: &Solved<T, AGENTS>,
+        barrier: T,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) {
+        let Workspace { iterate, candidate, turns, .. } = workspace;
+        let Some(refinement) = turns.refinement() else { return };
+        let [pace, pull] = solved.pace;
+        candidate.assign(iterate, self.frame);
+        candidate.pace = iterate.pace + pace + barrier * pull;
+        for (offsets, system) in candidate.interior_mut(self.frame).zip(&refinement.systems) {
+            let steps = system.step.path.iter().zip(&system.pull.path);
+            for (offset, (change, pull)) in offsets.iter_mut().zip(steps) {
+                *offset += change + pull * barrier;
+            }
+        }
+        for ((agent, kind), _) in self.frame.equipment() {
+            let Some(system) = refinement.systems.get(agent) else { continue };
+            let levels = candidate.levels_mut((agent, kind), self.frame.intervals);
+            let steps = system.step.control.iter().zip(&system.pull.control);
+            for (level, (change, pull)) in levels.iter_mut().zip(steps) {
+                *level += change[kind as usize] + barrier * pull[kind as usize];
+            }
+        }
     }
 
     /// What a step is to lower: objective and worst values, and the barriers of all slacks.
@@ -436,18 +531,32 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         ledger: &mut Ledger<T>,
     ) -> Option<Move<T, AGENTS>> {
         self.assemble(workspace);
-        let (global_weight, global_right) = self.pace_equation(workspace);
+        let pace_equation = self.pace_equation(workspace);
         let smallest = T::real(1e-6) * (T::one() + self.barrier);
         let mut shift = if self.shift > T::zero() { self.shift * T::real(0.25) } else { T::zero() };
         for _ in 0..SHIFTS_MAX {
             ledger.factorizations += 1;
-            if let Some(step) = self.solve(shift, (global_weight, global_right), workspace) {
+            if let Some(solved) = self.solve(shift, pace_equation, workspace) {
                 self.shift = shift;
-                return Some(step);
+                return self.step(&solved, workspace);
             }
             shift = (shift * T::real(6.0)).max(smallest);
         }
         None
+    }
+
+    /// The step of a solved system, left in its systems too; the iterate plus it is left in `workspace.candidate`.
+    fn step<const NODES: usize, const SENSORS: usize>(
+        &mut self,
+        solved: &Solved<T, AGENTS>,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> Option<Move<T, AGENTS>> {
+        self.barrier = self.choose(solved, workspace);
+        self.lay(solved, self.barrier, workspace);
+        let refinement = workspace.turns.refinement()?;
+        refinement.systems.iter_mut().take(self.frame.agents).for_each(|system| system.aim(self.barrier));
+        let step = solved.aim(self.barrier);
+        (step.slope.finite() && step.slope < T::zero()).then_some(step)
     }
 
     fn assemble<const NODES: usize, const SENSORS: usize>(
@@ -496,23 +605,24 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         }
     }
 
-    /// What the pace's own equation has besides the agents' parts: the intervals, the penalty, its bounds.
+    /// What the pace's own equation has besides the agents' parts: the intervals, the penalty, its bounds. Its right-hand side
+    /// is in coefficients of 1 and mu.
     fn pace_equation<const NODES: usize, const SENSORS: usize>(
         &self,
         workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> (T, T) {
+    ) -> (T, [T; 2]) {
         let pace = workspace.iterate.pace;
         let timing = &self.scenario.frame.time;
         let duration = self.frame.duration(pace);
         let late = (self.frame.start_time + duration - timing.target).max(T::zero());
         let by_pace = -duration / pace;
         let two = T::real(2.0);
-        let (mut weight, mut push) = (T::zero(), T::zero());
+        let (mut weight, mut push, mut centre) = (T::zero(), T::zero(), T::zero());
         let sides = self.frame.pace_slacks(pace).into_iter().zip(self.pace_multipliers).zip([T::one(), -T::one()]);
         for ((slack, multiplier), side) in sides {
             let Some(slack) = slack else { continue };
             weight += multiplier / slack;
-            push += side * self.barrier / slack;
+            centre += side / slack;
         }
         let penalty = timing.penalty * late * late;
         if late > T::zero() {
@@ -522,17 +632,16 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         // Integrals are as 1 / r where nothing else moves.
         let integrals = self.objective - penalty;
         weight += two * integrals / (pace * pace);
-        (weight, push + integrals / pace)
+        (weight, [push + integrals / pace, centre])
     }
 
     fn solve<const NODES: usize, const SENSORS: usize>(
         &self,
         shift: T,
-        (global_weight, global_right): (T, T),
+        (global_weight, global_right): (T, [T; 2]),
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) -> Option<Move<T, AGENTS>> {
-        let Workspace { iterate, candidate, turns, .. } = workspace;
-        let refinement = turns.refinement()?;
+    ) -> Option<Solved<T, AGENTS>> {
+        let refinement = workspace.turns.refinement()?;
         let agents = self.frame.agents;
         let mut weight = global_weight + shift * self.frame.inertia;
         let mut right = global_right;
@@ -546,37 +655,21 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             system.solve_all();
             let part = system.reduce()?;
             weight += part.weight();
-            right += part.right();
+            right.iter_mut().zip(part.right()).for_each(|(right, part)| *right += part);
             let _ = reduced.push(part);
         }
         if weight.is_not_a_number() || weight <= T::zero() {
             return None;
         }
-        let pace = right / weight;
-        let mut step = Move { unknowns: Vec::new(), slope: -global_right * pace };
-        candidate.assign(iterate, self.frame);
-        candidate.pace = iterate.pace + pace;
+        let pace = right.map(|right| right / weight);
+        let mut solved = Solved { pace, unknowns: Vec::new(), work: products(&global_right, &pace) };
         for (system, part) in refinement.systems.iter_mut().zip(&reduced) {
             let unknowns = system.expand(part, pace);
-            step.slope -= system.work(&unknowns);
-            let _ = step.unknowns.push(unknowns);
+            solved.work.iter_mut().zip(system.work(&unknowns)).for_each(|(work, part)| *work += part);
+            let _ = solved.unknowns.push(unknowns);
         }
-        if !step.slope.finite() || step.slope >= T::zero() {
-            return None;
-        }
-        for (offsets, system) in candidate.interior_mut(self.frame).zip(&refinement.systems) {
-            for (offset, change) in offsets.iter_mut().zip(&system.step.path) {
-                *offset += change;
-            }
-        }
-        for ((agent, kind), _) in self.frame.equipment() {
-            let Some(system) = refinement.systems.get(agent) else { continue };
-            let levels = candidate.levels_mut((agent, kind), self.frame.intervals);
-            for (level, change) in levels.iter_mut().zip(&system.step.control) {
-                *level += change[kind as usize];
-            }
-        }
-        Some(step)
+        let slope = solved.slope(self.barrier);
+        (slope.finite() && slope < T::zero()).then_some(solved)
     }
 
     /// Goes along the step as far as bounds and merit allow; returns the share, or `None` if nothing was gained.

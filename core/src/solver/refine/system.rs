@@ -169,14 +169,20 @@ pub(super) struct System<T, const DIM: usize, const NODES: usize> {
     pub(super) local: [Local<T, DIM>; NODES],
     pub(super) columns: [Part<T, DIM, NODES>; COLUMNS],
     solved: [Part<T, DIM, NODES>; COLUMNS],
-    /// Minus the gradient.
+    /// Minus the gradient of the objective.
     pub(super) right: Part<T, DIM, NODES>,
-    /// The step, once solved.
+    /// Gradient of the sum of ln g: what the barrier parameter multiplies.
+    pub(super) centre: Part<T, DIM, NODES>,
+    /// `centre`, solved.
+    pub(super) pull: Part<T, DIM, NODES>,
+    /// `right`, solved, and after [`Self::aim`] the step.
     pub(super) step: Part<T, DIM, NODES>,
     /// Border by border, upper left of the reduced system.
     pub(super) border: [[T; COLUMNS]; COLUMNS],
     /// Right-hand side of the border.
     pub(super) border_right: [T; COLUMNS],
+    /// What the barrier parameter multiplies there.
+    pub(super) border_centre: [T; COLUMNS],
     /// Which columns are in use.
     pub(super) used: [bool; COLUMNS],
     pub(super) controls: Controls,
@@ -192,9 +198,12 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
             columns: [const { Part::zeros() }; COLUMNS],
             solved: [const { Part::zeros() }; COLUMNS],
             right: Part::zeros(),
+            centre: Part::zeros(),
+            pull: Part::zeros(),
             step: Part::zeros(),
             border: [[T::ZERO; COLUMNS]; COLUMNS],
             border_right: [T::ZERO; COLUMNS],
+            border_centre: [T::ZERO; COLUMNS],
             used: [false; COLUMNS],
             controls: Controls::None,
             intervals: 0,
@@ -214,8 +223,10 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
             column.clear(intervals);
         }
         self.right.clear(intervals);
+        self.centre.clear(intervals);
         self.border = [[T::zero(); COLUMNS]; COLUMNS];
         self.border_right = [T::zero(); COLUMNS];
+        self.border_centre = [T::zero(); COLUMNS];
     }
 
     /// Factors with `shift` times the metric added; false if the result is not positive definite.
@@ -252,9 +263,10 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
         block::factor(self.factored.get_mut(..interior).unwrap_or_default(), T::zero())
     }
 
-    /// Solves for the right-hand side and every column in use.
+    /// Solves for both right-hand sides and every column in use.
     pub(super) fn solve_all(&mut self) {
-        let Self { factored, local, columns, solved, right, step, used, controls, intervals, .. } = self;
+        let Self { factored, local, columns, solved, right, centre, pull, step, used, controls, intervals, .. } =
+            self;
         let matrix = Matrix { factored, local, controls: *controls, intervals: *intervals };
         for ((solved, column), _) in solved.iter_mut().zip(columns).zip(used).filter(|(_, used)| **used) {
             solved.assign(column, matrix.intervals);
@@ -262,6 +274,22 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
         }
         step.assign(right, matrix.intervals);
         matrix.solve(step);
+        pull.assign(centre, matrix.intervals);
+        matrix.solve(pull);
+    }
+
+    /// Adds `barrier` times the step towards the centre to the step.
+    pub(super) fn aim(&mut self, barrier: T) {
+        for (value, part) in self.step.path.iter_mut().zip(&self.pull.path).take(self.intervals) {
+            *value += part * barrier;
+        }
+        if self.controls == Controls::Some {
+            for (values, parts) in self.step.control.iter_mut().zip(&self.pull.control).take(self.intervals) {
+                for (value, &part) in values.iter_mut().zip(parts) {
+                    *value += part * barrier;
+                }
+            }
+        }
     }
 
     /// The reduced border: the pace's own equation, `weight * pace = right`, after this agent's part is eliminated;
@@ -269,11 +297,13 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
     pub(super) fn reduce(&self) -> Option<Reduced<T>> {
         let mut matrix = self.border;
         let mut right = self.border_right;
+        let mut centre = self.border_centre;
         for a in 0..COLUMNS {
             if !self.used[a] {
                 continue;
             }
             right[a] -= self.columns[a].dot(&self.step, self.intervals, self.controls);
+            centre[a] -= self.columns[a].dot(&self.pull, self.intervals, self.controls);
             for b in 0..COLUMNS {
                 if self.used[b] {
                     matrix[a][b] -= self.columns[a].dot(&self.solved[b], self.intervals, self.controls);
@@ -302,50 +332,74 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
                     matrix[row][column] -= share * above;
                 }
                 right[row] -= share * right[pivot_index];
+                centre[row] -= share * centre[pivot_index];
             }
         }
-        Some(Reduced { matrix, right })
+        Some(Reduced { matrix, right, centre })
     }
 
-    /// The border's unknowns for a change of pace, and the agent's part of the step, left in `step`.
-    pub(super) fn expand(&mut self, reduced: &Reduced<T>, pace: T) -> [T; COLUMNS] {
-        let mut unknowns = [T::zero(); COLUMNS];
-        unknowns[PACE] = pace;
-        for row in (1..COLUMNS).rev() {
-            if !self.used[row] {
-                continue;
+    /// The border's unknowns for changes of pace, of the step and of the one towards the centre, and the agent's parts of both.
+    pub(super) fn expand(&mut self, reduced: &Reduced<T>, pace: [T; 2]) -> [[T; COLUMNS]; 2] {
+        let Self { solved, step, pull, used, controls, intervals, .. } = self;
+        let mut both = [[T::zero(); COLUMNS]; 2];
+        let sides = pace.into_iter().zip([(&reduced.right, step), (&reduced.centre, pull)]).zip(&mut both);
+        for ((pace, (right, step)), unknowns) in sides {
+            unknowns[PACE] = pace;
+            for row in (1..COLUMNS).rev() {
+                if !used[row] {
+                    continue;
+                }
+                let mut rest = right[row] - reduced.matrix[row][PACE] * pace;
+                for (&coefficient, &unknown) in reduced.matrix[row].iter().zip(unknowns.iter()).skip(row + 1) {
+                    rest -= coefficient * unknown;
+                }
+                unknowns[row] = rest / reduced.matrix[row][row];
             }
-            let mut rest = reduced.right[row] - reduced.matrix[row][PACE] * pace;
-            for (&coefficient, &unknown) in reduced.matrix[row].iter().zip(&unknowns).skip(row + 1) {
-                rest -= coefficient * unknown;
-            }
-            unknowns[row] = rest / reduced.matrix[row][row];
-        }
-        for (column, (&unknown, &used)) in unknowns.iter().zip(&self.used).enumerate() {
-            if !used || unknown == T::zero() {
-                continue;
-            }
-            let solved = &self.solved[column];
-            for (value, part) in self.step.path.iter_mut().zip(&solved.path).take(self.intervals) {
-                *value -= part * unknown;
-            }
-            if self.controls == Controls::Some {
-                for (values, parts) in self.step.control.iter_mut().zip(&solved.control).take(self.intervals) {
-                    for (value, &part) in values.iter_mut().zip(parts) {
-                        *value -= part * unknown;
+            for (column, (&unknown, &used)) in unknowns.iter().zip(used.iter()).enumerate() {
+                if !used || unknown == T::zero() {
+                    continue;
+                }
+                let solved = &solved[column];
+                for (value, part) in step.path.iter_mut().zip(&solved.path).take(*intervals) {
+                    *value -= part * unknown;
+                }
+                if *controls == Controls::Some {
+                    for (values, parts) in step.control.iter_mut().zip(&solved.control).take(*intervals) {
+                        for (value, &part) in values.iter_mut().zip(parts) {
+                            *value -= part * unknown;
+                        }
                     }
                 }
             }
         }
-        unknowns
+        both
     }
 
-    /// Minus the gradient times the step, the shared part of the pace aside.
-    pub(super) fn work(&self, unknowns: &[T; COLUMNS]) -> T {
-        let border = self.border_right.iter().zip(unknowns).zip(&self.used).filter(|(_, used)| **used);
-        let border = border.fold(T::zero(), |sum, ((&right, &unknown), _)| sum + right * unknown);
-        border + self.right.dot(&self.step, self.intervals, self.controls)
+    /// Minus the gradient times the step, the shared part of the pace aside, as coefficients of 1, mu and mu squared.
+    pub(super) fn work(&self, unknowns: &[[T; COLUMNS]; 2]) -> [T; 3] {
+        let used = |numbers: &[T; COLUMNS]| {
+            core::array::from_fn::<T, COLUMNS, _>(
+                |column| if self.used[column] { numbers[column] } else { T::zero() },
+            )
+        };
+        let mut work = [T::zero(); 3];
+        for (((&right, &centre), &step), &pull) in
+            used(&self.border_right).iter().zip(&used(&self.border_centre)).zip(&unknowns[0]).zip(&unknowns[1])
+        {
+            work.iter_mut().zip(products(&[right, centre], &[step, pull])).for_each(|(work, part)| *work += part);
+        }
+        let dot = |a: &Part<T, DIM, NODES>, b: &Part<T, DIM, NODES>| a.dot(b, self.intervals, self.controls);
+        let [by_step, by_both, by_pull] = &mut work;
+        *by_step += dot(&self.right, &self.step);
+        *by_both += dot(&self.right, &self.pull) + dot(&self.centre, &self.step);
+        *by_pull += dot(&self.centre, &self.pull);
+        work
     }
+}
+
+/// (a_0 + a_1 mu) (b_0 + b_1 mu), as coefficients of 1, mu and mu squared.
+pub(super) fn products<T: Real>([a, a_by]: &[T; 2], [b, b_by]: &[T; 2]) -> [T; 3] {
+    [*a * *b, *a * *b_by + *a_by * *b, *a_by * *b_by]
 }
 
 /// The factored part of a system, on loan.
@@ -409,6 +463,7 @@ fn columns_solved<T: Real, const DIM: usize>(
 pub(super) struct Reduced<T> {
     matrix: [[T; COLUMNS]; COLUMNS],
     right: [T; COLUMNS],
+    centre: [T; COLUMNS],
 }
 
 impl<T: Real> Reduced<T> {
@@ -418,7 +473,7 @@ impl<T: Real> Reduced<T> {
     }
 
     /// Right-hand side of the pace's equation.
-    pub(super) fn right(&self) -> T {
-        self.right[PACE]
+    pub(super) fn right(&self) -> [T; 2] {
+        [self.right[PACE], self.centre[PACE]]
     }
 }
