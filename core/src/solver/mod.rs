@@ -269,7 +269,7 @@ struct Ledger<T> {
     /// Part of the usual way inside its bounds that a plan is drawn before it is refined.
     inside: T,
     times: Times,
-    /// Steps that a refinement takes beyond its limit while it has gained nothing.
+    /// Steps that a refinement takes beyond its limit while it has gained nothing or is not at a second barrier parameter.
     patience: usize,
     keeps: Keeps,
 }

@@ -19,8 +19,9 @@ use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbou
 pub(super) const POLISH_ITERATIONS: usize = 12;
 /// Refinement steps of one candidate.
 pub(super) const POLISH_REFINEMENTS: usize = 10;
-/// Steps that a candidate has beyond these while it is no better than it was laid: what draws it inside its bounds makes it
-/// worse at first, and one that was stopped there would be compared by what it was laid with.
+/// Steps that a candidate has beyond these while it is no better than it was laid, or has not come to a second barrier
+/// parameter: what draws it inside its bounds makes it worse at first, and one that was stopped there would be compared by
+/// what it was laid with, and one that is still on its way to the centre by how far it has come.
 pub(super) const PATIENCE: usize = 15;
 /// Part of what the champion gains in the end that the second may be behind it to be polished to the end too.
 const SECOND_CHANCE: f64 = 2.0;

@@ -53,7 +53,7 @@ const LAST_BARRIER: f64 = 1e-11;
 /// Factor between barrier parameters.
 const BARRIER_FACTOR: f64 = 0.1;
 /// The barrier parameter falls when a step predicts a decrease of less than this many of it.
-const CENTERED: f64 = 3.0;
+const CENTERED: f64 = 2.0;
 /// It may fall by more than one factor when a step predicts less than this many of it,
 const WELL_CENTERED: f64 = 0.1;
 /// to the least of these parts of it
@@ -61,13 +61,15 @@ const LEAPS: [f64; 2] = [1e-3, 1e-2];
 /// at which bounds leave this much of the step.
 const CLEAR_WAY: f64 = 0.95;
 /// Part of the way to the boundary that a step may go.
-const TO_BOUNDARY: f64 = 0.99;
+const TO_BOUNDARY: f64 = 0.97;
 /// Part of the predicted decrease that a step must bring.
 const SUFFICIENT: f64 = 1e-4;
 /// Factors tried for the shift of one system.
 pub(super) const SHIFTS_MAX: usize = 24;
 /// Halvings of one step.
 pub(super) const HALVINGS_MAX: usize = 25;
+/// Least part of a multiplier that one step leaves.
+const MULTIPLIER_LEFT: f64 = 0.01;
 /// Multipliers stay within this factor of mu / g.
 const MULTIPLIER_RANGE: f64 = 1e8;
 /// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
@@ -307,10 +309,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         self.reset_multipliers(workspace);
         self.weigh(workspace);
         ledger.evaluations += 1;
-        let known = ledger.best;
+        let (known, first) = (ledger.best, self.barrier);
         let mut short = 0;
         for step in 0..steps + ledger.patience {
-            if step >= steps && ledger.best < known {
+            if step >= steps && ledger.best < known && self.barrier < first {
                 break;
             }
             if deadline() {
@@ -706,7 +708,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 self.keep_if_best(workspace, ledger);
                 let range = T::real(MULTIPLIER_RANGE);
                 self.visit_multipliers(workspace, Some(&step.unknowns), |old, target| {
-                    let floor = old * T::real(1.0 - TO_BOUNDARY);
+                    let floor = old * T::real(MULTIPLIER_LEFT);
                     let moved = old + (target - old) * share.max(T::real(0.1));
                     moved.max(floor).min(old * range)
                 });
