@@ -16,7 +16,7 @@ use crate::solver::controls::{Bound, KINDS, Kind};
 use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
 use crate::trajectory::Trajectory;
 
-use super::barrier::{Multipliers, for_each_wall};
+use super::barrier::{Multipliers, for_each_wall, held};
 use super::extremes::Extremes;
 use super::limits::Limits;
 use super::rows::{Ball, for_each_ball, index};
@@ -45,6 +45,8 @@ pub(super) struct Source<'a, T, const DIM: usize, const NODES: usize, const AGEN
     pub(super) extremes: &'a Extremes<T>,
     /// mu.
     pub(super) barrier: T,
+    /// Multipliers are taken within this factor of mu / g.
+    pub(super) range: T,
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<'_, T, DIM, NODES, AGENTS> {
@@ -63,7 +65,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         self.walls(domain, agent, offsets, multipliers, system);
         self.levels(index, agent, multipliers, system);
         for node in 1..=self.frame.intervals {
-            self.node(index, agent, node, multipliers, system, scratch);
+            self.node(index, agent, node, system, scratch);
         }
     }
 
@@ -76,8 +78,9 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
     ) {
         let intervals = self.frame.intervals;
         for_each_ball(self.frame, agent, offsets, self.iterate.pace, |place, ball| {
-            let multiplier = multipliers.of_ball(place, intervals).copied().unwrap_or_default();
-            add_ball(ball, multiplier, system);
+            let Some(multiplier) = multipliers.of_ball(place, intervals) else { return };
+            *multiplier = held(*multiplier, self.barrier / ball.slack(), self.range);
+            add_ball(ball, *multiplier, system);
         });
     }
 
@@ -86,17 +89,14 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         domain: &Domain<T, DIM>,
         agent: &AgentFrame<T, DIM>,
         offsets: &[Point<T, DIM>],
-        multipliers: &Multipliers<T, DIM, NODES>,
+        multipliers: &mut Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
     ) {
         for_each_wall(self.frame, domain, agent, (offsets, self.iterate.pace), |wall| {
-            let multiplier = multipliers
-                .place
-                .get(wall.side)
-                .and_then(|side| side.get(wall.node))
-                .map_or(T::zero(), |point| point.get(wall.component).copied().unwrap_or_default());
-            let stiffness = multiplier / wall.slack;
+            let Some(multiplier) = multipliers.of_wall(wall) else { return };
             let push = T::one() / wall.slack;
+            *multiplier = held(*multiplier, self.barrier * push, self.range);
+            let stiffness = *multiplier * push;
             let (by_offset, by_pace) = (wall.by_offset, wall.by_pace);
             let Some(row) = system.rows.get_mut(wall.node) else { return };
             if let Some(entry) = row.here.get_mut((wall.component, wall.component)) {
@@ -118,7 +118,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         &self,
         index: usize,
         agent: &AgentFrame<T, DIM>,
-        multipliers: &Multipliers<T, DIM, NODES>,
+        multipliers: &mut Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
     ) {
         let one = T::one();
@@ -129,18 +129,22 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let levels = self.iterate.levels((index, kind), self.frame.intervals);
             let used = levels.iter().fold(T::zero(), |sum, &level| sum + level);
             let rest = allowance * self.iterate.pace - used;
-            let [low, high] = &multipliers.level;
-            let sides = low[kind_index].iter().zip(&high[kind_index]);
+            let [low, high] = &mut multipliers.level;
+            let sides = low[kind_index].iter_mut().zip(&mut high[kind_index]);
             let nodes =
                 system.local.iter_mut().zip(&mut system.centre.control).zip(&mut system.columns[column].control);
-            for ((((local, right), border), &level), (&low, &high)) in nodes.zip(levels).zip(sides) {
-                local.matrix[kind_index][kind_index] += low / level + high / (one - level);
+            for ((((local, right), border), &level), (low, high)) in nodes.zip(levels).zip(sides) {
+                *low = held(*low, self.barrier / level, self.range);
+                *high = held(*high, self.barrier / (one - level), self.range);
+                local.matrix[kind_index][kind_index] += *low / level + *high / (one - level);
                 right[kind_index] += one / level - one / (one - level) - one / rest;
                 border[kind_index] = -one;
             }
+            let budget = &mut multipliers.budget[kind_index];
+            *budget = held(*budget, self.barrier / rest, self.range);
             system.border[column][PACE] = allowance;
             system.border[PACE][column] = allowance;
-            system.border[column][column] = -rest / multipliers.budget[kind_index];
+            system.border[column][column] = -rest / *budget;
             system.border_centre[PACE] += allowance / rest;
         }
     }
@@ -151,7 +155,6 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         agent_index: usize,
         agent: &AgentFrame<T, DIM>,
         node: usize,
-        multipliers: &Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
     ) {
@@ -159,20 +162,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let at = At { agent_index, agent, node, variables, roles: &roles };
         // Fewer layouts take less code, and more figures that are zero.
         match roles.len() {
-            0..=4 if cfg!(feature = "compact") => self.node_of::<4>(&at, multipliers, system, scratch),
-            3.. if cfg!(feature = "compact") => self.node_of::<VARIABLES_MAX>(&at, multipliers, system, scratch),
-            0..=2 => self.node_of::<2>(&at, multipliers, system, scratch),
-            3 => self.node_of::<3>(&at, multipliers, system, scratch),
-            4 => self.node_of::<4>(&at, multipliers, system, scratch),
-            5 | 6 => self.node_of::<6>(&at, multipliers, system, scratch),
-            _ => self.node_of::<VARIABLES_MAX>(&at, multipliers, system, scratch),
+            0..=4 if cfg!(feature = "compact") => self.node_of::<4>(&at, system, scratch),
+            3.. if cfg!(feature = "compact") => self.node_of::<VARIABLES_MAX>(&at, system, scratch),
+            0..=2 => self.node_of::<2>(&at, system, scratch),
+            3 => self.node_of::<3>(&at, system, scratch),
+            4 => self.node_of::<4>(&at, system, scratch),
+            5 | 6 => self.node_of::<6>(&at, system, scratch),
+            _ => self.node_of::<VARIABLES_MAX>(&at, system, scratch),
         }
     }
 
     fn node_of<const M: usize>(
         &self,
         at: &At<'_, T, DIM>,
-        multipliers: &Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
     ) {
@@ -198,9 +200,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let sign = worst.sign();
             let slack = worst.value - sign * jet.value;
             let slot = worst.slot;
-            let multiplier =
-                multipliers.extreme.get(slot).and_then(|nodes| nodes.get(node - 1)).copied().unwrap_or_default();
-            place.add_worst(&jet, sign, (slack, multiplier), EXTREMES + slot, system);
+            place.add_worst(&jet, sign, (slack, self.barrier / slack), EXTREMES + slot, system);
         }
     }
 

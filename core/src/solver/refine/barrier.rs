@@ -13,9 +13,14 @@ use crate::solver::controls::{Bound, KINDS};
 use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
 
 use super::rows::for_each_ball;
-use super::system::EXTREMES_MAX;
 
-/// The multipliers of one agent.
+/// A multiplier within a factor of its central value mu / g.
+#[inline]
+pub(super) fn held<T: Real>(multiplier: T, central: T, range: T) -> T {
+    multiplier.max(central / range).min(central * range)
+}
+
+/// The multipliers of one agent; those of worst values are always central.
 #[derive(Clone, Debug)]
 pub(super) struct Multipliers<T, const DIM: usize, const NODES: usize> {
     /// Steps, then bends, by interval.
@@ -25,26 +30,23 @@ pub(super) struct Multipliers<T, const DIM: usize, const NODES: usize> {
     /// Lower and upper bounds of levels, by kind and node - 1.
     pub(super) level: [[[T; NODES]; KINDS]; 2],
     pub(super) budget: [T; KINDS],
-    /// Worst values, by slot and node - 1.
-    pub(super) extreme: [[T; NODES]; EXTREMES_MAX],
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize> Multipliers<T, DIM, NODES> {
     pub(super) const fn zeros() -> Self {
         let none = [T::ZERO; NODES];
-        Self {
-            ball: [none; 2],
-            place: [[origin(); NODES]; 2],
-            level: [[none; KINDS]; 2],
-            budget: [T::ZERO; KINDS],
-            extreme: [none; EXTREMES_MAX],
-        }
+        Self { ball: [none; 2], place: [[origin(); NODES]; 2], level: [[none; KINDS]; 2], budget: [T::ZERO; KINDS] }
     }
 
     /// The multiplier of a ball by its place in the order of the visitor.
     pub(super) fn of_ball(&mut self, place: usize, intervals: usize) -> Option<&mut T> {
         let [steps, bends] = &mut self.ball;
         if place < intervals { steps.get_mut(place) } else { bends.get_mut(place - intervals) }
+    }
+
+    /// The multiplier of a box side.
+    pub(super) fn of_wall(&mut self, wall: &Wall<T>) -> Option<&mut T> {
+        self.place.get_mut(wall.side)?.get_mut(wall.node)?.get_mut(wall.component)
     }
 }
 
@@ -68,11 +70,12 @@ pub(super) fn for_each_wall<T: Real, const DIM: usize, const AGENTS: usize>(
     (offsets, pace): (&[Point<T, DIM>], T),
     mut visit: impl FnMut(&Wall<T>),
 ) {
-    let count = T::from_count(frame.intervals.max(1));
+    // The box as seen from the start, and by how much of it each node is further on.
+    let (low, high) = ((domain.min - agent.start) / agent.stride, (domain.max - agent.start) / agent.stride);
+    let advance = agent.line / (T::from_count(frame.intervals.max(1)) * agent.stride);
     for (node, offset) in offsets.iter().enumerate() {
-        let line = agent.start + agent.line * (T::from_count(node + 1) / count);
-        let low = (domain.min - line) / agent.stride;
-        let high = (domain.max - line) / agent.stride;
+        let along = advance * T::from_count(node + 1);
+        let (low, high) = (low - along, high - along);
         for (component, ((&value, &low), &high)) in offset.iter().zip(low.iter()).zip(high.iter()).enumerate() {
             let one = T::one();
             visit(&Wall { node, component, side: 0, slack: value - low * pace, by_offset: one, by_pace: -low });

@@ -52,10 +52,10 @@ const FIRST_BARRIER: f64 = 1e-3;
 const LAST_BARRIER: f64 = 1e-11;
 /// Factor between barrier parameters.
 const BARRIER_FACTOR: f64 = 0.1;
-/// The barrier parameter falls when a step predicts a decrease of less than this many of it.
-const CENTERED: f64 = 2.0;
-/// It may fall by more than one factor when a step predicts less than this many of it,
-const WELL_CENTERED: f64 = 0.1;
+/// The barrier parameter falls when a step predicts a decrease of less than this many of it for every slack.
+const CENTERED: f64 = 0.0055;
+/// It may fall by more than one factor when a step predicts less than this many of it for every slack,
+const WELL_CENTERED: f64 = 0.0003;
 /// to the least of these parts of it
 const LEAPS: [f64; 2] = [1e-3, 1e-2];
 /// at which bounds leave this much of the step.
@@ -70,8 +70,10 @@ pub(super) const SHIFTS_MAX: usize = 24;
 pub(super) const HALVINGS_MAX: usize = 25;
 /// Least part of a multiplier that one step leaves.
 const MULTIPLIER_LEFT: f64 = 0.01;
-/// Multipliers stay within this factor of mu / g.
+/// Largest factor of a multiplier that one step brings.
 const MULTIPLIER_RANGE: f64 = 1e8;
+/// Multipliers stay within this factor of mu / g.
+const CENTRAL_RANGE: f64 = 1e4;
 /// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
 const HELD_UP: (f64, usize) = (0.05, 2);
 
@@ -138,6 +140,7 @@ where
         barrier: if is_inside { ledger.barrier.min(first) } else { first },
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
         pace_multipliers: [T::zero(); 2],
+        range: T::one(),
         shift: T::zero(),
         times: ledger.times,
     };
@@ -220,6 +223,8 @@ struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     barrier_last: T,
     /// Of the smallest and of the largest pace.
     pace_multipliers: [T; 2],
+    /// Multipliers are taken within this factor of mu / g: 1 at first, which is what they begin as.
+    range: T,
     shift: T,
     times: Times,
 }
@@ -306,7 +311,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) -> Followed {
-        self.reset_multipliers(workspace);
+        self.range = T::one();
+        self.frame.expand(&workspace.iterate, &mut workspace.trial);
         self.weigh(workspace);
         ledger.evaluations += 1;
         let (known, first) = (ledger.best, self.barrier);
@@ -320,7 +326,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             }
             ledger.refinements += 1;
             let Some(newton) = self.newton(workspace, ledger) else { return Followed::To(Status::Stalled) };
-            let is_centered = -newton.slope <= T::real(CENTERED) * self.barrier;
+            let is_centered = -newton.slope <= self.little(CENTERED);
             let Some(share) = self.advance(&newton, workspace, ledger) else {
                 if self.barrier <= self.barrier_last {
                     return Followed::To(Status::Converged);
@@ -348,6 +354,12 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             && neighbours::piece(self.scenario, self.frame.duration(pace)).iter().any(Option::is_some)
     }
 
+    /// A decrease of the merit that is so many barrier parameters for every slack of bounds on the path.
+    fn little(&self, part: f64) -> T {
+        let slacks = self.frame.agents * self.frame.intervals * (2 + 2 * DIM);
+        T::from_count(slacks) * T::real(part) * self.barrier
+    }
+
     /// The next barrier parameter.
     fn lower(&self) -> T {
         self.part(BARRIER_FACTOR)
@@ -366,10 +378,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) -> T {
         let predicted = -solved.slope(self.barrier);
-        if predicted > T::real(CENTERED) * self.barrier {
+        if predicted > self.little(CENTERED) {
             return self.barrier;
         }
-        if predicted <= T::real(WELL_CENTERED) * self.barrier {
+        if predicted <= self.little(WELL_CENTERED) {
             let domain = &self.scenario.frame.domain;
             for barrier in LEAPS.map(|part| self.part(part)) {
                 self.lay(solved, barrier, workspace);
@@ -446,51 +458,37 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         self.logs = logs + self.bound_logs(iterate, &self.extremes, trial, scratch);
     }
 
-    /// Multipliers at their central values.
-    fn reset_multipliers<const NODES: usize, const SENSORS: usize>(
+    /// Moves every multiplier along the whole step, which `workspace.candidate` is at, as far as the iterate is going to.
+    fn move_multipliers<const NODES: usize, const SENSORS: usize>(
         &mut self,
+        share: T,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
-        let keep = |_: T, central: T| central;
-        let slacks = self.frame.pace_slacks(workspace.iterate.pace);
-        self.pace_multipliers = slacks.map(|slack| slack.map_or(T::zero(), |slack| self.barrier / slack));
-        self.frame.expand(&workspace.iterate, &mut workspace.trial);
-        self.visit_multipliers(workspace, None, keep);
-    }
-
-    /// Replaces every multiplier by `update(old, mu / g, lambda change)`; with a step, slacks are those before it.
-    fn visit_multipliers<const NODES: usize, const SENSORS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-        unknowns: Option<&Vec<[T; COLUMNS], AGENTS>>,
-        update: impl Fn(T, T) -> T,
-    ) {
-        let Workspace { iterate, candidate, trial, scratch, turns, .. } = workspace;
+        let Workspace { iterate, candidate, turns, .. } = workspace;
         let (frame, barrier) = (self.frame, self.barrier);
         let Some(Refinement { systems, multipliers }) = turns.refinement() else { return };
-        // `candidate` is the iterate plus the whole step; the target of a multiplier is (mu - lambda dg) / g.
-        let step_of = |agent: usize| systems.get(agent);
-        let pace_step = if unknowns.is_some() { candidate.pace - iterate.pace } else { T::zero() };
-        let target = |slack: T, multiplier: T, change: T| (barrier - multiplier * change) / slack;
-        let sources = iterate.interior(frame).zip(frame.agent()).zip(multipliers.iter_mut());
-        for (index, ((offsets, agent), multipliers)) in sources.enumerate() {
-            let Some(system) = step_of(index) else { continue };
-            let interior = frame.intervals.saturating_sub(1);
-            let direction =
-                if unknowns.is_some() { system.step.path.get(..interior).unwrap_or_default() } else { &[] };
+        let share = share.max(T::real(0.1));
+        let (left, range) = (T::real(MULTIPLIER_LEFT), T::real(MULTIPLIER_RANGE));
+        // At the end of the step it is (mu - lambda dg) / g.
+        let update = |multiplier: &mut T, slack: T, change: T| {
+            let old = *multiplier;
+            let target = (barrier - old * change) / slack;
+            *multiplier = (old + (target - old) * share).max(old * left).min(old * range);
+        };
+        let pace_step = candidate.pace - iterate.pace;
+        let agents = iterate.interior(frame).zip(frame.agent()).zip(systems.iter().zip(multipliers));
+        for (index, ((offsets, agent), (system, multipliers))) in agents.enumerate() {
+            let direction = system.step.path.get(..frame.intervals.saturating_sub(1)).unwrap_or_default();
             rows::for_each_ball(frame, agent, offsets, iterate.pace, |place, ball| {
                 let Some(multiplier) = multipliers.of_ball(place, frame.intervals) else { return };
-                let change = ball.slack_change(direction, pace_step);
-                *multiplier = update(*multiplier, target(ball.slack(), *multiplier, change));
+                update(multiplier, ball.slack(), ball.slack_change(direction, pace_step));
             });
             let domain = &self.scenario.frame.domain;
             barrier::for_each_wall(frame, domain, agent, (offsets, iterate.pace), |wall| {
                 let moved = direction.get(wall.node).and_then(|node| node.get(wall.component)).copied();
                 let change = wall.by_offset * moved.unwrap_or_default() + wall.by_pace * pace_step;
-                let side = multipliers.place.get_mut(wall.side).and_then(|side| side.get_mut(wall.node));
-                if let Some(multiplier) = side.and_then(|point| point.get_mut(wall.component)) {
-                    *multiplier = update(*multiplier, target(wall.slack, *multiplier, change));
-                }
+                let Some(multiplier) = multipliers.of_wall(wall) else { return };
+                update(multiplier, wall.slack, change);
             });
             for (kind, bound) in Kind::ALL.into_iter().zip(agent.controls) {
                 let Bound::Level { allowance } = bound else { continue };
@@ -501,28 +499,19 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 let (mut rest, mut rest_change) = (allowance * iterate.pace, allowance * pace_step);
                 let sides = low[kind_index].iter_mut().zip(high[kind_index].iter_mut());
                 for ((low, high), (&level, &there)) in sides.zip(levels.iter().zip(there)) {
-                    let change = if unknowns.is_some() { there - level } else { T::zero() };
-                    *low = update(*low, target(level, *low, change));
-                    *high = update(*high, target(T::one() - level, *high, -change));
+                    let change = there - level;
+                    update(low, level, change);
+                    update(high, T::one() - level, -change);
                     (rest, rest_change) = (rest - level, rest_change - change);
                 }
-                let budget = &mut multipliers.budget[kind_index];
-                *budget = update(*budget, target(rest, *budget, rest_change));
-            }
-            // Those of worst values depend on where the iterate is, not on the step.
-            for worst in self.extremes.of(index).filter(|_| unknowns.is_none()) {
-                let Some(nodes) = multipliers.extreme.get_mut(worst.slot) else { continue };
-                worst.for_each(self.scenario, trial, scratch, |node, signed| {
-                    // Towards the centre: the change of the metric itself is not known here.
-                    if let Some(multiplier) = nodes.get_mut(node - 1) {
-                        *multiplier = barrier / (worst.value - signed);
-                    }
-                });
+                update(&mut multipliers.budget[kind_index], rest, rest_change);
             }
         }
         let slacks = frame.pace_slacks(iterate.pace).into_iter().zip([pace_step, -pace_step]);
         for (multiplier, (slack, change)) in self.pace_multipliers.iter_mut().zip(slacks) {
-            *multiplier = slack.map_or(T::zero(), |slack| update(*multiplier, target(slack, *multiplier, change)));
+            if let Some(slack) = slack {
+                update(multiplier, slack, change);
+            }
         }
     }
 
@@ -533,6 +522,12 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         ledger: &mut Ledger<T>,
     ) -> Option<Move<T, AGENTS>> {
         self.assemble(workspace);
+        for (multiplier, slack) in
+            self.pace_multipliers.iter_mut().zip(self.frame.pace_slacks(workspace.iterate.pace))
+        {
+            *multiplier =
+                slack.map_or(T::zero(), |slack| barrier::held(*multiplier, self.barrier / slack, self.range));
+        }
         let pace_equation = self.pace_equation(workspace);
         let smallest = T::real(1e-6) * (T::one() + self.barrier);
         let mut shift = if self.shift > T::zero() { self.shift * T::real(0.25) } else { T::zero() };
@@ -574,6 +569,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             trajectory: trial,
             extremes: &self.extremes,
             barrier: self.barrier,
+            range: self.range,
         };
         let agents = self.frame.agent().zip(systems.iter_mut()).zip(multipliers);
         for (index, ((agent, system), multipliers)) in agents.enumerate() {
@@ -706,29 +702,15 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
                 (self.objective, self.logs) = (objective, logs);
                 self.keep_if_best(workspace, ledger);
-                let range = T::real(MULTIPLIER_RANGE);
-                self.visit_multipliers(workspace, Some(&step.unknowns), |old, target| {
-                    let floor = old * T::real(MULTIPLIER_LEFT);
-                    let moved = old + (target - old) * share.max(T::real(0.1));
-                    moved.max(floor).min(old * range)
-                });
+                self.move_multipliers(share, workspace);
+                self.range = T::real(CENTRAL_RANGE);
                 workspace.iterate.assign(&workspace.next, self.frame);
                 self.extremes = extremes;
-                self.hold_multipliers(workspace);
                 return Some(share);
             }
             share *= T::real(0.5);
         }
         None
-    }
-
-    /// Keeps multipliers near mu / g of the slacks that there are now.
-    fn hold_multipliers<const NODES: usize, const SENSORS: usize>(
-        &mut self,
-        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-    ) {
-        let range = T::real(1e4);
-        self.visit_multipliers(workspace, None, |old, central| old.clamp_to(central / range, central * range));
     }
 
     /// Takes `workspace.trial`, strictly feasible, as the incumbent if its objective is better.
