@@ -88,6 +88,9 @@ fn single_precision_plans_nearly_as_well() {
         "square8-energy",
         "square8-aee-lagged",
         "square8-worst-detection",
+        "square8-mixed",
+        "square8-cep",
+        "square8-team",
         "volume8-detection",
         "swarm4",
     ] {

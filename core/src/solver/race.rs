@@ -28,6 +28,9 @@ const SECOND_CHANCE: f64 = 2.0;
 /// Times that levels and directions are laid anew in the end, and the least part of the objective that it must bring.
 pub(super) const EQUIPS_MAX: usize = 2;
 const EQUIPS_GAIN: f64 = 1e-6;
+/// Part of the usual barrier parameter that begins the refinement of a candidate: a larger one draws it further from the way
+/// that it was laid.
+const CANDIDATE: f64 = 0.4;
 /// Part of the usual barrier parameter that begins a refinement of levels laid anew, and of levels laid elsewhere.
 const ANEW: f64 = 0.01;
 const ELSEWHERE: f64 = 0.1;
@@ -153,8 +156,10 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
         ledger.evaluations += 1;
         ledger.patience = if settings.refinements > POLISH_REFINEMENTS && !is_large { PATIENCE } else { 0 };
+        let first = ledger.first;
+        ledger.first = first * T::real(CANDIDATE);
         let status = polish(scenario, &short, workspace, ledger, deadline);
-        ledger.patience = 0;
+        (ledger.first, ledger.patience) = (first, 0);
         let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
         let level = if is_alike { found.level } else { ledger.best };
         let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
