@@ -49,6 +49,10 @@ pub trait Real:
     fn spelled(single: f32, double: f64) -> Self;
     /// `self` in double precision, exactly.
     fn to_f64(self) -> f64;
+    /// The nearest number in single precision.
+    fn to_f32(self) -> f32;
+    /// `value`, exactly.
+    fn of_f32(value: f32) -> Self;
     /// The nearest number to `count`.
     fn from_count(count: usize) -> Self;
     /// Neither infinite nor NaN.
@@ -126,6 +130,14 @@ macro_rules! real {
             #[inline]
             fn to_f64(self) -> f64 {
                 f64::from(self)
+            }
+            #[inline]
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+            #[inline]
+            fn of_f32(value: f32) -> Self {
+                $type::from(value)
             }
             #[inline]
             fn from_count(count: usize) -> Self {

@@ -83,7 +83,7 @@ use core::ops::AddAssign;
 use heapless::Vec;
 
 use crate::math::{Point, Real};
-use crate::metrics::{Adjoint, Needs, Sample, Situation, Values, backward, forward};
+use crate::metrics::{Adjoint, Needs, Sample, Situation, Values, backward, figures, forward};
 use crate::model::jamming::Emitter;
 use crate::scenario::{Betrayal, Reduce, ReferencePoint, View};
 use crate::trajectory::Trajectory;
@@ -130,8 +130,9 @@ pub(crate) fn needed_values<T: Real, const DIM: usize, const NODES: usize, const
         let nothing = T::real(f64::NAN);
         return Values { detection: nothing, false_alarm: nothing, location: None };
     };
-    let emitters = emitters(scenario, trajectory, node);
-    forward(scenario, &situation, &emitters, needs, scratch).values
+    let mut emitters = Emitters::<T, DIM, AGENTS>::new();
+    lay_emitters(scenario, trajectory, node, &mut emitters);
+    figures(scenario, &situation, &emitters, needs, scratch)
 }
 
 /// All figures of an agent that stands at `position` (length units) at `time` (s): no jamming, no dropout, and
@@ -151,7 +152,7 @@ pub fn point_values<T: Real, const DIM: usize>(
         level: zero,
         betrayal: Betrayal::None,
     };
-    forward(scenario, &situation, &[], Needs::ALL, scratch).values
+    figures(scenario, &situation, &[], Needs::ALL, scratch)
 }
 
 /// The objective, penalty on late arrival included.
@@ -218,8 +219,9 @@ pub(crate) fn merit_gradient<T: Real, const DIM: usize, const NODES: usize, cons
         survey(scenario, trajectory, Which::Extremes, merit, (&mut tally, &mut limits), scratch);
         limits = T::zero();
     }
+    let mut emitters = Emitters::<T, DIM, AGENTS>::new();
     for node in 1..trajectory.nodes() {
-        let mut emitters = emitters(scenario, trajectory, node);
+        lay_emitters(scenario, trajectory, node, &mut emitters);
         for agent in 0..trajectory.agents() {
             let Some(situation) = situation(scenario, trajectory, agent, node) else {
                 continue;
@@ -269,8 +271,9 @@ fn survey<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     (tally, limits): (&mut Tally<T, AGENTS>, &mut T),
     scratch: &mut [Sample<T, DIM>],
 ) {
+    let mut emitters = Emitters::<T, DIM, AGENTS>::new();
     for node in 1..trajectory.nodes() {
-        let emitters = emitters(scenario, trajectory, node);
+        lay_emitters(scenario, trajectory, node, &mut emitters);
         for agent in 0..trajectory.agents() {
             let Some(situation) = situation(scenario, trajectory, agent, node) else {
                 continue;
@@ -282,7 +285,7 @@ fn survey<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
             if needs.nothing() {
                 continue;
             }
-            let values = forward(scenario, &situation, &emitters, needs, scratch).values;
+            let values = figures(scenario, &situation, &emitters, needs, scratch);
             tally.compare(scenario, agent, node, situation.time, &values);
             if which == Which::All {
                 tally.integrate(scenario, agent, situation.time, interval(trajectory, node), &values);
@@ -364,13 +367,17 @@ fn situation<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>
     })
 }
 
-/// All jammers at `node`.
-fn emitters<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+/// All jammers at a node.
+type Emitters<T, const DIM: usize, const AGENTS: usize> = Vec<Emitter<T, DIM>, AGENTS>;
+
+/// All jammers at `node`, into a list that is made once: handed over, it would be copied in full, room and all.
+fn lay_emitters<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
     node: usize,
-) -> Vec<Emitter<T, DIM>, AGENTS> {
-    let mut emitters = Vec::new();
+    emitters: &mut Emitters<T, DIM, AGENTS>,
+) {
+    emitters.clear();
     for (index, (agent, track)) in scenario.agents.iter().zip(trajectory.active()).enumerate() {
         let at_node = (track.path.get(node), track.jam.get(node), track.azimuth.get(node));
         if let (Some(jammer), (Some(&position), Some(&level), Some(&azimuth))) = (&agent.jammer, at_node) {
@@ -378,5 +385,4 @@ fn emitters<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
             let _ = emitters.push(Emitter::new(index, jammer, position, level, azimuth));
         }
     }
-    emitters
 }

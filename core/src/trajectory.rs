@@ -105,10 +105,24 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
     /// # Errors
     /// `grid.intervals` or `agent` where the scenario exceeds the capacities.
     pub fn straight(scenario: &View<'_, T, DIM>, duration: T) -> Result<Self, Error> {
+        let mut straight = Self::empty();
+        straight.lay_straight(scenario, duration)?;
+        Ok(straight)
+    }
+
+    /// Becomes [`Trajectory::straight`], where it is: handed over, a trajectory of large capacities is copied from stack to stack
+    /// on its way.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn lay_straight(&mut self, scenario: &View<'_, T, DIM>, duration: T) -> Result<(), Error> {
         let intervals = scenario.frame.intervals;
-        let mut straight = Self::zeros(intervals, scenario.agents.len())?;
-        straight.set_duration(scenario.frame.start_time, duration);
-        for (track, agent) in straight.tracks.iter_mut().zip(scenario.agents) {
+        self.resize(intervals, scenario.agents.len())?;
+        self.set_duration(scenario.frame.start_time, duration);
+        for (track, agent) in self.tracks.iter_mut().zip(scenario.agents) {
+            for controls in [&mut track.jam, &mut track.azimuth, &mut track.dropout] {
+                controls.iter_mut().take(intervals + 1).for_each(|control| *control = T::zero());
+            }
             for (node, position) in track.path.iter_mut().enumerate().take(intervals + 1) {
                 let share = T::from_count(node) / T::from_count(intervals);
                 *position = agent.start + (agent.goal - agent.start) * share;
@@ -117,7 +131,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Traject
                 *goal = agent.goal;
             }
         }
-        Ok(straight)
+        Ok(())
     }
 
     /// Intervals N.

@@ -25,7 +25,14 @@ pub struct Memory(Option<Box<dyn Any + Send>>);
 impl Memory {
     fn take<T: Real, const DIM: usize>(&mut self) -> Box<HostWorkspace<T, DIM>> {
         let kept = self.0.take().and_then(|kept| kept.downcast().ok());
-        kept.unwrap_or_else(|| Box::new(Workspace::new()))
+        kept.unwrap_or_else(Self::make)
+    }
+
+    /// Apart from what plans: megabytes pass through the stack of whoever this is inlined into, each time.
+    #[cold]
+    #[inline(never)]
+    fn make<T: Real, const DIM: usize>() -> Box<HostWorkspace<T, DIM>> {
+        Box::new(Workspace::new())
     }
 
     fn keep<T: Real, const DIM: usize>(&mut self, workspace: Box<HostWorkspace<T, DIM>>) {

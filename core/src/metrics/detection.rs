@@ -16,8 +16,32 @@
 use crate::math::Real;
 use crate::metrics::sample::{Sample, Situation};
 use crate::model::betrayal::{Betrayed, betrayed};
-use crate::model::detector;
-use crate::scenario::{Betrayal, Pooling, StoredSensor};
+use crate::model::{detector, soft_square};
+use crate::scenario::{Betrayal, Pooling, StoredSensor, View};
+
+/// The combined probability alone, which is what [`forward`] returns: that also keeps what the way back needs.
+#[inline]
+pub(super) fn value<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    sensors_max: usize,
+) -> T {
+    let heard = T::one() - situation.dropout;
+    let softening = scenario.frame.softening;
+    let mut combined = T::zero();
+    for sensor in scenario.sensors.iter().take(sensors_max) {
+        let Some(detection) = &sensor.detection else { continue };
+        let place = scenario.sensor_state(sensor, situation.time).0;
+        let square = soft_square(&(situation.position - place), softening);
+        let silent = detector::detection(detection, square).value;
+        let loud = match situation.betrayal {
+            Betrayal::None => silent,
+            other => betrayed(other, &sensor.jam, silent, situation.level, square).probability,
+        };
+        combined += heard * loud * (T::one() - combined);
+    }
+    combined
+}
 
 /// Fills in the detection part of the samples and returns the combined probability.
 #[inline]

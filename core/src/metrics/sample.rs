@@ -115,6 +115,24 @@ pub(crate) struct Outcome<T, const DIM: usize> {
     pub covariance: Option<fisher::Covariance<T, DIM>>,
 }
 
+/// The values of [`forward`]; `samples` are of no use afterwards.
+#[inline]
+pub(crate) fn figures<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    emitters: &[Emitter<T, DIM>],
+    needs: Needs,
+    samples: &mut [Sample<T, DIM>],
+) -> Values<T> {
+    if !needs.detection || scenario.frame.pooling != Pooling::None {
+        return forward(scenario, situation, emitters, needs, samples).values;
+    }
+    let rest = Needs { detection: false, ..needs };
+    let others =
+        if rest.nothing() { Values::default() } else { forward(scenario, situation, emitters, rest, samples).values };
+    Values { detection: detection::value(scenario, situation, samples.len()), ..others }
+}
+
 /// Figures of one agent at one node, of the kinds that `needs` names.
 pub(crate) fn forward<T: Real, const DIM: usize>(
     scenario: &View<'_, T, DIM>,

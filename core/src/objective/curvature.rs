@@ -26,7 +26,7 @@ use heapless::Vec;
 
 use super::merit::Merit;
 use super::tally::{self, Tally, Which};
-use super::{Extreme, emitters, situation, survey};
+use super::{Emitters, Extreme, lay_emitters, situation, survey};
 use crate::jet::Jet;
 use crate::math::Real;
 use crate::metrics::curvature::{Around, Focus, LocationJets, detection, false_alarm, location};
@@ -180,7 +180,8 @@ where
     T: Real,
 {
     let mut sum = Jet::constant(T::zero());
-    let emitters = emitters(scenario, trajectory, node);
+    let mut emitters = Emitters::<T, DIM, AGENTS>::new();
+    lay_emitters(scenario, trajectory, node, &mut emitters);
     let emits = emitters.iter().any(|emitter| emitter.agent == agent);
     let moves = variables.time.is_some() && scenario.sensors.iter().any(|sensor| sensor.is_moving());
     for other in 0..trajectory.agents() {

@@ -79,7 +79,7 @@ where
     let allowed = scenario.frame.time.max - scenario.frame.start_time;
     let has_velocity = scenario.agents.iter().any(|agent| agent.start_velocity.is_some());
     if is_straight_only(scenario) {
-        workspace.best = Trajectory::straight(scenario, allowed)?;
+        workspace.best.lay_straight(scenario, allowed)?;
         return Ok(());
     }
     if let Start::Given(given) = start {
@@ -98,7 +98,7 @@ where
     }
     let first = first_duration(scenario);
     if !has_velocity {
-        workspace.best = Trajectory::straight(scenario, first)?;
+        workspace.best.lay_straight(scenario, first)?;
         lay_controls(scenario, &mut workspace.best);
         if guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) <= T::zero() {
             avoid_by_time(scenario, workspace)?;
@@ -108,7 +108,7 @@ where
     let shortest = scenario.shortest_flight().max(first * T::real(0.1));
     for stretch in STRETCHES {
         let duration = (shortest * T::real(stretch)).min(allowed);
-        workspace.trial = Trajectory::straight(scenario, duration)?;
+        workspace.trial.lay_straight(scenario, duration)?;
         if bring_within(scenario, settings, duration, workspace) {
             workspace.best.assign(&workspace.trial);
             lay_controls(scenario, &mut workspace.best);
@@ -133,7 +133,7 @@ fn avoid_by_time<T: Real, const DIM: usize, const NODES: usize, const SENSORS: u
     let between =
         (0..TIMES).map(|time| shortest + (allowed - shortest) * (T::from_count(time + 1) / T::from_count(TIMES)));
     for duration in core::iter::once(usual).chain(between) {
-        workspace.trial = Trajectory::straight(scenario, duration)?;
+        workspace.trial.lay_straight(scenario, duration)?;
         if guard::smallest_slack(scenario, &workspace.trial, &mut workspace.scratch) > T::zero() {
             workspace.best.assign(&workspace.trial);
             break;

@@ -12,7 +12,7 @@ use super::workspace::{LATTICE_CELLS, LATTICE_PARENTS};
 pub(super) use layout::Turns;
 
 /// What the lattice works on.
-type LatticeTables<T> = Tables<T, LATTICE_CELLS, LATTICE_PARENTS>;
+type LatticeTables = Tables<LATTICE_CELLS, LATTICE_PARENTS>;
 
 #[cfg(feature = "roomy")]
 mod layout {
@@ -21,7 +21,7 @@ mod layout {
     /// Memory of both.
     #[derive(Clone, Debug)]
     pub(in crate::solver) struct Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
-        lattice: LatticeTables<T>,
+        lattice: LatticeTables,
         refinement: Refinement<T, DIM, NODES, AGENTS>,
     }
 
@@ -31,13 +31,12 @@ mod layout {
             Self { lattice: LatticeTables::EMPTY, refinement: Refinement::EMPTY };
         /// Bytes more than where memory is shared: what the smaller of both takes.
         pub(in crate::solver) const ROOM: usize = {
-            let (lattice, refinement) =
-                (size_of::<LatticeTables<T>>(), size_of::<Refinement<T, DIM, NODES, AGENTS>>());
+            let (lattice, refinement) = (size_of::<LatticeTables>(), size_of::<Refinement<T, DIM, NODES, AGENTS>>());
             if lattice < refinement { lattice } else { refinement }
         };
 
         /// For the lattice.
-        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables<T>> {
+        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables> {
             Some(&mut self.lattice)
         }
 
@@ -58,7 +57,7 @@ mod layout {
     #[repr(u8)]
     #[expect(clippy::large_enum_variant, reason = "there is no heap to put either on")]
     pub(in crate::solver) enum Turns<T, const DIM: usize, const NODES: usize, const AGENTS: usize> {
-        Lattice(LatticeTables<T>),
+        Lattice(LatticeTables),
         Refinement(Refinement<T, DIM, NODES, AGENTS>),
     }
 
@@ -72,7 +71,7 @@ mod layout {
         const REFINEMENT: Self = Self::Refinement(Refinement::EMPTY);
 
         /// For the lattice; `None` never comes.
-        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables<T>> {
+        pub(in crate::solver) fn lattice(&mut self) -> Option<&mut LatticeTables> {
             if !matches!(self, Self::Lattice(_)) {
                 *self = Self::EMPTY;
             }

@@ -69,7 +69,7 @@ pub(crate) fn equip<
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     agent: usize,
-    tables: &mut Tables<T, CELLS, PARENTS>,
+    tables: &mut Tables<CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> Prices<T>
 where
@@ -104,7 +104,7 @@ pub(crate) fn equip_elsewhere<
     scenario: &View<'_, T, DIM>,
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     (agent, level): (usize, Level),
-    tables: &mut Tables<T, CELLS, PARENTS>,
+    tables: &mut Tables<CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> bool
 where
@@ -156,7 +156,7 @@ fn lay<T, const DIM: usize, const NODES: usize, const AGENTS: usize, const CELLS
     trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
     (agent, kind): (usize, Level),
     (budget, place): (T, Where),
-    tables: &mut Tables<T, CELLS, PARENTS>,
+    tables: &mut Tables<CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
 ) -> T
 where
@@ -173,7 +173,7 @@ where
         for (_, gains) in
             nodes.zip(tables.cost.iter_mut().zip(&mut tables.next)).filter(|(level, _)| **level > T::real(0.5))
         {
-            (*gains.0, *gains.1) = (T::zero(), T::zero());
+            (*gains.0, *gains.1) = (0.0, 0.0);
         }
     }
     let gains = [&tables.cost, &tables.next].map(|gains| gains.get(..intervals).unwrap_or_default());
@@ -191,7 +191,7 @@ fn weigh<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
     (agent, kind): (usize, Level),
     levels: [T; 2],
-    [half, full]: [&mut [T]; 2],
+    [half, full]: [&mut [f32]; 2],
     scratch: &mut [Sample<T, DIM>],
 ) {
     let Some(field) = Field::new(scenario, trajectory, agent, Prices::default(), SHARPNESS.len(), scratch) else {
@@ -207,14 +207,15 @@ fn weigh<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
         for (gain, level) in [half, full].into_iter().zip(levels) {
             let there = field.rate_at(&slice, &position, &at(level), scratch);
             // Where a limit forbids both there is nothing to choose.
-            *gain = if there < T::INFINITY { none - there } else { T::zero() };
-            *gain = gain.min(T::real(GAIN_MAX));
+            let gained = if there < T::INFINITY { none - there } else { T::zero() };
+            *gain = gained.min(T::real(GAIN_MAX)).to_f32();
         }
     }
 }
 
 /// The level that pays most at a price.
-fn choice<T: Real>([half, full]: [T; 2], levels: [T; 2], price: T) -> T {
+fn choice<T: Real>(gains: [f32; 2], levels: [T; 2], price: T) -> T {
+    let [half, full] = gains.map(T::of_f32);
     let worth = [half - price * levels[0], full - price * levels[1]];
     if worth[1] > T::zero() && worth[1] >= worth[0] {
         levels[1]
@@ -226,13 +227,17 @@ fn choice<T: Real>([half, full]: [T; 2], levels: [T; 2], price: T) -> T {
 }
 
 /// The prices between which the budget is used up: at the first it is exceeded, unless that is 0, at the second it is kept.
-fn price<T: Real>([half, full]: [&[T]; 2], levels: [T; 2], allowance: T) -> [T; 2] {
+fn price<T: Real>([half, full]: [&[f32]; 2], levels: [T; 2], allowance: T) -> [T; 2] {
     let used = |price: T| {
         let all = half.iter().zip(full);
         all.fold(T::zero(), |sum, (&half, &full)| sum + choice([half, full], levels, price))
     };
     let least = levels[0].max(T::MIN_POSITIVE);
-    let high = half.iter().map(|&gain| gain / least).chain(full.iter().copied()).fold(T::zero(), T::max);
+    let high = half
+        .iter()
+        .map(|&gain| T::of_f32(gain) / least)
+        .chain(full.iter().map(|&gain| T::of_f32(gain)))
+        .fold(T::zero(), T::max);
     if used(T::zero()) <= allowance || !high.finite() {
         return [T::zero(); 2];
     }
@@ -248,7 +253,7 @@ fn price<T: Real>([half, full]: [&[T]; 2], levels: [T; 2], allowance: T) -> [T; 
 }
 
 /// Writes the levels: those at the higher price, and what is left to those who would pay the lower, first come, first served.
-fn allot<T: Real>(gains: [&[T]; 2], levels: [T; 2], price: [T; 2], allowance: T, nodes: &mut [T]) {
+fn allot<T: Real>(gains: [&[f32]; 2], levels: [T; 2], price: [T; 2], allowance: T, nodes: &mut [T]) {
     let mut left = allowance;
     let all = || gains[0].iter().zip(gains[1]).map(|(&half, &full)| [half, full]);
     for (node, gains) in nodes.iter_mut().zip(all()) {

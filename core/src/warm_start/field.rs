@@ -11,7 +11,7 @@ use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real};
-use crate::metrics::{Needs, Sample, Situation, Values, forward};
+use crate::metrics::{Needs, Sample, Situation, Values, figures};
 use crate::model::jamming::Emitter;
 use crate::objective::needed_values;
 use crate::scenario::{
@@ -295,14 +295,17 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         &Doing { level, azimuth, dropout }: &Doing<T>,
         scratch: &mut [Sample<T, DIM>],
     ) -> T {
-        let mut emitters = slice.emitters.clone();
+        let mut with_own = Vec::<_, AGENTS>::new();
+        let mut emitters = slice.emitters.as_slice();
         if let (Some(jammer), true) = (&self.agent.jammer, level > T::zero()) {
             // One an agent at most, so there is room.
-            let _ = emitters.push(Emitter::new(self.index, jammer, *position, level, azimuth));
+            let _ = with_own.extend_from_slice(emitters);
+            let _ = with_own.push(Emitter::new(self.index, jammer, *position, level, azimuth));
+            emitters = &with_own;
         }
         let betrayal = self.agent.jammer.map_or(Betrayal::None, |jammer| jammer.betrayal);
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-        let values = forward(self.scenario, &here, &emitters, slice.own.needs, scratch).values;
+        let values = figures(self.scenario, &here, emitters, slice.own.needs, scratch);
         if self.scenario.limits.iter().any(|limit| is_outside(limit, &values)) {
             return T::INFINITY;
         }
@@ -311,7 +314,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             let (dropout, level, betrayal) = (T::zero(), T::zero(), Betrayal::None);
             let there =
                 Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-            rate += self.price(weights, &forward(self.scenario, &there, &emitters, weights.needs, scratch).values);
+            rate += self.price(weights, &figures(self.scenario, &there, emitters, weights.needs, scratch));
         }
         if rate.finite() { rate } else { T::INFINITY }
     }
@@ -363,7 +366,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
         let needs = Needs::of_limits(self.scenario.limits);
-        let values = forward(self.scenario, &here, &slice.emitters, needs, scratch).values;
+        let values = figures(self.scenario, &here, &slice.emitters, needs, scratch);
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));
         found.map(Blocked::Limit)
     }

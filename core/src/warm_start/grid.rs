@@ -203,14 +203,16 @@ impl Moves {
                     *component = i8::try_from(rest % side).unwrap_or(0) - most;
                     rest /= side;
                 }
+                let farthest = offset.iter().map(|cells| cells.abs()).max().unwrap_or(0);
+                if farthest != ring {
+                    continue;
+                }
                 let mut step = Point::<T, DIM>::zeros();
                 for ((component, &cells), &side) in step.iter_mut().zip(&offset).zip(grid.pitch.iter()) {
-                    *component = T::real(f64::from(cells)) * side;
+                    *component = T::of_f32(f32::from(cells)) * side;
                 }
-                let farthest = offset.iter().map(|cells| cells.abs()).max().unwrap_or(0);
                 let fits = offset.iter().zip(&grid.counts).all(|(cells, &n)| usize::from(cells.unsigned_abs()) < n);
-                if farthest == ring
-                    && fits
+                if fits
                     && norm_squared(&step) <= reach_squared
                     && let Some(slot) = self.list.get_mut(self.count)
                 {

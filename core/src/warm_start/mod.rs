@@ -53,6 +53,8 @@ pub const VARIANTS_MAX: usize = 8;
 const INFLATION_MAX: f64 = 1.25;
 /// Fewest slices of a flight.
 const SLICES_MIN: usize = 2;
+/// Largest running cost of a cell: sums of them are finite in single precision.
+const RATE_MAX: f64 = 1e30;
 /// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
 const FREE: f64 = 1e-3;
 
@@ -83,16 +85,16 @@ enum Caution {
 /// Running cost of each of `CELLS` cells; kept from search to search where it does not change with time.
 #[derive(Clone, Debug)]
 pub(crate) struct Landscape<T, const CELLS: usize> {
-    rates: [T; CELLS],
+    rates: [f32; CELLS],
     /// What they are of.
     surveyed: Survey<T>,
 }
 
 /// Memory of one search: room for `CELLS` cells, and for `PARENTS` entries, one a cell and inner slice.
 #[derive(Clone, Debug)]
-pub(crate) struct Tables<T, const CELLS: usize, const PARENTS: usize> {
-    cost: [T; CELLS],
-    next: [T; CELLS],
+pub(crate) struct Tables<const CELLS: usize, const PARENTS: usize> {
+    cost: [f32; CELLS],
+    next: [f32; CELLS],
     parents: [u8; PARENTS],
     moves: Moves,
 }
@@ -100,7 +102,7 @@ pub(crate) struct Tables<T, const CELLS: usize, const PARENTS: usize> {
 /// What a search works on.
 pub(crate) struct Lattice<'a, T, const CELLS: usize, const PARENTS: usize> {
     pub(crate) landscape: &'a mut Landscape<T, CELLS>,
-    pub(crate) tables: &'a mut Tables<T, CELLS, PARENTS>,
+    pub(crate) tables: &'a mut Tables<CELLS, PARENTS>,
 }
 
 /// What a landscape that does not change with time depends on.
@@ -245,7 +247,7 @@ impl<T: Real> Survey<T> {
 
 impl<T: Real, const CELLS: usize> Landscape<T, CELLS> {
     /// Of nothing.
-    pub(crate) const EMPTY: Self = Self { rates: [T::ZERO; CELLS], surveyed: Survey::NOTHING };
+    pub(crate) const EMPTY: Self = Self { rates: [0.0; CELLS], surveyed: Survey::NOTHING };
 
     /// Forgets what it is of, which belongs to a scenario.
     pub(crate) fn begin(&mut self) {
@@ -253,10 +255,10 @@ impl<T: Real, const CELLS: usize> Landscape<T, CELLS> {
     }
 }
 
-impl<T: Real, const CELLS: usize, const PARENTS: usize> Tables<T, CELLS, PARENTS> {
+impl<const CELLS: usize, const PARENTS: usize> Tables<CELLS, PARENTS> {
     /// All zeros.
     pub(crate) const EMPTY: Self =
-        Self { cost: [T::ZERO; CELLS], next: [T::ZERO; CELLS], parents: [0; PARENTS], moves: Moves::none() };
+        Self { cost: [0.0; CELLS], next: [0.0; CELLS], parents: [0; PARENTS], moves: Moves::none() };
 }
 
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PARENTS> {
@@ -312,7 +314,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             if number == plan.slices {
                 return self.arrive(field, plan, &slice, caution);
             }
-            self.tables.next.iter_mut().take(cells).for_each(|cost| *cost = T::INFINITY);
+            self.tables.next.iter_mut().take(cells).for_each(|cost| *cost = f32::INFINITY);
             let wanted = wanted.meet(&reached)?;
             if number == 1 {
                 self.depart(field, plan, &slice, caution);
@@ -349,19 +351,21 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         self.landscape.surveyed = Survey { is_known: is_lasting, ..key };
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
+        let most = T::real(RATE_MAX);
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
         for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape.rates) {
             if !needed.holds(&at) {
                 continue;
             }
             let way = norm(&(center - field.agent.start)) + norm(&(field.agent.goal - center));
-            *rate = if way > plan.farthest + plan.grid.size() {
+            let cost = if way > plan.farthest + plan.grid.size() {
                 T::INFINITY
             } else if caution == Caution::Through {
                 if field.blocked(slice, &center, margin, scratch).is_some() { T::one() } else { T::real(FREE) }
             } else {
                 field.best_rate(slice, (&center, &plan.grid.pitch), (caution, margin), scratch)
             };
+            *rate = if cost.finite() { cost.clamp_to(-most, most).to_f32() } else { f32::INFINITY };
         }
         if caution == Caution::Through {
             return;
@@ -374,7 +378,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             }
             let rate = self.landscape.rates.get_mut(cell);
             if let Some(rate) = rate.filter(|rate| rate.finite()) {
-                *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch));
+                *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch).to_f32());
             }
         }
     }
@@ -414,7 +418,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             if norm(&(center - start)) <= plan.reach && is_clear(field, slice, (&start, &center), caution) {
                 let mean = self.mean_from(plan, &center, &start);
                 if let Some(cost) = self.tables.next.get_mut(cell) {
-                    *cost = mean * plan.interval;
+                    *cost = (mean * plan.interval).to_f32();
                 }
             }
         }
@@ -435,12 +439,12 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             return;
         };
         let landscape = &self.landscape.rates;
-        let mut sweep = Sweep { landscape, cost, next, parents, interval: plan.interval };
+        let mut sweep = Sweep { landscape, cost, next, parents, interval: plan.interval.to_f32() };
         let is_open = caution == Caution::Through || field.scenario.regions.is_empty();
         let clear = (!is_open).then_some(|from: usize, to: usize| {
             is_clear(field, slice, (&plan.grid.center_of(from), &plan.grid.center_of(to)), caution)
         });
-        sweep.run(&plan.grid, moves.all(), blocks, clear);
+        sweep.run(&plan.grid.counts, moves.all(), blocks, clear);
     }
 
     /// The last slice: to the goal itself.
@@ -454,6 +458,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         let goal = field.agent.goal;
         let mut best = None;
         for ((cell, (_, center)), &before) in plan.grid.iter().enumerate().zip(&self.tables.cost) {
+            let before = T::of_f32(before);
             if before == T::INFINITY || norm(&(goal - center)) > plan.reach {
                 continue;
             }
@@ -480,7 +485,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         for sample in 0..=samples {
             let cell = plan.grid.cell(&(center + step * (T::from_count(sample) / T::from_count(samples))));
             if sample == 0 || cell != last {
-                sum += self.landscape.rates.get(cell).copied().unwrap_or(T::INFINITY);
+                sum += T::of_f32(self.landscape.rates.get(cell).copied().unwrap_or(f32::INFINITY));
                 count += 1;
             }
         }

@@ -102,28 +102,28 @@ impl<const DIM: usize> Block<DIM> {
 }
 
 /// What one slice works on; all lists are of cells.
-pub(super) struct Sweep<'a, T> {
-    pub(super) landscape: &'a [T],
-    pub(super) cost: &'a [T],
-    pub(super) next: &'a mut [T],
+pub(super) struct Sweep<'a> {
+    pub(super) landscape: &'a [f32],
+    pub(super) cost: &'a [f32],
+    pub(super) next: &'a mut [f32],
     pub(super) parents: &'a mut [u8],
     /// Length of the slice, s.
-    pub(super) interval: T,
+    pub(super) interval: f32,
 }
 
-impl<T: Real> Sweep<'_, T> {
+impl Sweep<'_> {
     /// Takes the moves in turn from the block `alive` to the block `wanted`; `clear` is asked whether a move from a cell to
     /// another is open, or nothing is where it is `None`.
     pub(super) fn run<const DIM: usize>(
         &mut self,
-        grid: &Grid<T, DIM>,
+        counts: &[usize; DIM],
         moves: &[Move],
         (alive, wanted): (&Block<DIM>, &Block<DIM>),
         mut clear: Option<impl FnMut(usize, usize) -> bool>,
     ) {
         for (number, step) in (0..=u8::MAX).zip(moves) {
-            let Some(to) = alive.moved(step, &grid.counts).and_then(|moved| moved.meet(wanted)) else { continue };
-            for (mut cell, mut left) in to.rows(&grid.counts) {
+            let Some(to) = alive.moved(step, counts).and_then(|moved| moved.meet(wanted)) else { continue };
+            for (mut cell, mut left) in to.rows(counts) {
                 while left > 0 {
                     let length = left.min(CHUNK);
                     self.relax((number, step), cell, length, clear.as_mut());
@@ -148,58 +148,41 @@ impl<T: Real> Sweep<'_, T> {
         let before = cost.get(from..from + length).unwrap_or_default();
         let next = next.get_mut(first..first + length).unwrap_or_default();
         let parents = parents.get_mut(first..first + length).unwrap_or_default();
-        let mut between = step.between().map(|back| row(first.wrapping_add_signed(back)));
-        let half = T::real(0.5);
-        let ends = row(first).iter().zip(row(from)).map(|(&near, &far)| (near + far) * half);
-        let count = T::from_count(step.between().count() + 1);
+        let count = f32::from_count(step.between().count() + 1);
         let weight = *interval / count;
-        let mut keep = |(((best, parent), &before), sum): (((&mut T, &mut u8), &T), T)| {
-            let total = before + sum * weight;
-            let is_better = total < *best;
-            *best = if is_better { total } else { *best };
-            *parent = if is_better { number } else { *parent };
-        };
-        let cells = next.iter_mut().zip(parents).zip(before);
-        if let Some(clear) = clear {
-            let mut sums = [T::zero(); CHUNK];
-            sums.iter_mut().zip(ends).for_each(|(sum, end)| *sum = end);
-            for row in between {
-                sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
-            }
-            for (index, (((best, parent), &before), &sum)) in cells.zip(&sums).enumerate() {
-                let total = before + sum * weight;
-                if total < *best && clear(from + index, first + index) {
-                    (*best, *parent) = (total, number);
-                }
-            }
-            return;
+        // One loop a step, and no choice in any: the compiler makes each one of vectors.
+        let mut totals = [0.0; CHUNK];
+        for ((total, &near), &far) in totals.iter_mut().zip(row(first)).zip(row(from)) {
+            *total = (near + far) * 0.5;
         }
-        if cfg!(feature = "compact") {
-            let mut sums = [T::zero(); CHUNK];
-            sums.iter_mut().zip(ends).for_each(|(sum, end)| *sum = end);
-            for row in between {
-                sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
-            }
-            cells.zip(sums).for_each(&mut keep);
-            return;
-        }
-        // Each number of cells between is a loop of its own, which the compiler makes one of vectors.
-        match [between.next(), between.next(), between.next()] {
-            [None, ..] => cells.zip(ends).for_each(&mut keep),
-            [Some(a), None, _] => cells.zip(ends.zip(a).map(|(sum, &a)| sum + a)).for_each(&mut keep),
-            [Some(a), Some(b), None] => {
-                cells.zip(ends.zip(a).zip(b).map(|((sum, &a), &b)| sum + a + b)).for_each(&mut keep);
-            }
-            [Some(a), Some(b), Some(c)] => {
-                let mut sums = [T::zero(); CHUNK];
-                let inner = ends.zip(a).zip(b).zip(c).map(|(((sum, &a), &b), &c)| sum + a + b + c);
-                sums.iter_mut().zip(inner).for_each(|(sum, inner)| *sum = inner);
-                for row in between {
-                    sums.iter_mut().zip(row).for_each(|(sum, &rate)| *sum += rate);
-                }
-                cells.zip(sums).for_each(&mut keep);
+        for back in step.between() {
+            for (total, &rate) in totals.iter_mut().zip(row(first.wrapping_add_signed(back))) {
+                *total += rate;
             }
         }
+        for (total, &before) in totals.iter_mut().zip(before) {
+            *total = before + *total * weight;
+        }
+        let Some(clear) = clear else { return keep(number, &totals, next, parents) };
+        for (index, ((best, parent), &total)) in next.iter_mut().zip(parents).zip(&totals).enumerate() {
+            if total < *best && clear(from + index, first + index) {
+                (*best, *parent) = (total, number);
+            }
+        }
+    }
+}
+
+/// Enters a move where its total is less than the best so far.
+#[inline]
+fn keep(number: u8, totals: &[f32; CHUNK], next: &mut [f32], parents: &mut [u8]) {
+    let mut better = [0_u8; CHUNK];
+    for ((better, best), &total) in better.iter_mut().zip(next).zip(totals) {
+        let is_better = total < *best;
+        *better = if is_better { u8::MAX } else { 0 };
+        *best = if is_better { total } else { *best };
+    }
+    for (parent, better) in parents.iter_mut().zip(better) {
+        *parent = *parent & !better | number & better;
     }
 }
 

@@ -82,8 +82,8 @@ fn find_with(
     let view = scenario.view();
     let mut path = Path::straight(&view, duration).unwrap();
     let mut landscape = Box::new(Landscape::EMPTY);
-    landscape.rates.fill(rate);
-    let mut tables = Box::new(Tables::<f64, 1024, 32768>::EMPTY);
+    landscape.rates.fill(rate as f32);
+    let mut tables = Box::new(Tables::<1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 32];
     let variant = Variant { reach, inflation: 1.12, duration, span: duration };
@@ -261,7 +261,7 @@ fn finds_its_way_in_three_dimensions() {
     let view = scenario.view();
     let mut path = Trajectory::<f64, 3, 41, 1>::straight(&view, 110.0).unwrap();
     let mut landscape = Box::new(Landscape::EMPTY);
-    let mut tables = Box::new(Tables::<f64, 1024, 32768>::EMPTY);
+    let mut tables = Box::new(Tables::<1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 4];
     let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0, span: 110.0 };
@@ -281,14 +281,14 @@ fn a_full_list_of_moves_stays_in_the_grid() {
     let mut moves = grid::Moves::none();
     moves.collect(&grid, 10.0 * grid.size());
     assert!(moves.all().len() > 200, "{}", moves.all().len());
-    let (mut cost, mut next) = (List::from([1.0; 1024]), List::from([f64::INFINITY; 1024]));
+    let (mut cost, mut next) = (List::from([1.0; 1024]), List::from([f32::INFINITY; 1024]));
     let (landscape, mut parents) = (List::from([1.0; 1024]), List::from([0_u8; 1024]));
     let whole = sweep::Block::whole(&grid.counts);
     let cells = grid.cells();
     cost.truncate(cells);
     let mut sweep =
         Sweep { landscape: &landscape, cost: &cost, next: &mut next, parents: &mut parents, interval: 2.0 };
-    sweep.run(&grid, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
+    sweep.run(&grid.counts, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
     // The landscape is level: all that counts is that every cell is reached, and from a cell.
     assert!(next[..cells].iter().all(|&total| total == 3.0), "{next:?}");
     for (cell, &parent) in parents.iter().enumerate().take(cells) {
@@ -306,29 +306,29 @@ fn a_sweep_takes_the_least_of_all_moves() {
     let mut random = 1_u32;
     let mut draw = || {
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 8) / f64::from(1 << 24)
+        (random >> 8) as f32 / (1 << 24) as f32
     };
     let cells = grid.cells();
-    let landscape: List<f64> = (0..cells).map(|_| draw()).collect();
-    let cost: List<f64> = (0..cells).map(|_| draw()).collect();
-    let (mut next, mut parents) = (List::from([f64::INFINITY; 400]), List::from([0_u8; 400]));
+    let landscape: List<f32> = (0..cells).map(|_| draw()).collect();
+    let cost: List<f32> = (0..cells).map(|_| draw()).collect();
+    let (mut next, mut parents) = (List::from([f32::INFINITY; 400]), List::from([0_u8; 400]));
     let whole = sweep::Block::whole(&grid.counts);
     let mut sweep =
         Sweep { landscape: &landscape, cost: &cost, next: &mut next, parents: &mut parents, interval: 0.5 };
-    sweep.run(&grid, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
+    sweep.run(&grid.counts, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
     for to in 0..cells {
         let at = grid.coordinates(to);
         let least = moves.all().iter().filter_map(|step| {
             let from = [0, 1].map(|axis| at[axis] as i64 - i64::from(step.offset()[axis]));
             let inside = (0..2).all(|axis| (0..grid.counts[axis] as i64).contains(&from[axis]));
             inside.then(|| {
-                let between: List<f64> = step.between().map(|back| landscape[to.wrapping_add_signed(back)]).collect();
+                let between: List<f32> = step.between().map(|back| landscape[to.wrapping_add_signed(back)]).collect();
                 let from = step.origin(to);
-                let sum = f64::midpoint(landscape[from], landscape[to]) + between.iter().sum::<f64>();
-                cost[from] + 0.5 * sum / (between.len() + 1) as f64
+                let sum = f32::midpoint(landscape[from], landscape[to]) + between.iter().sum::<f32>();
+                cost[from] + 0.5 * sum / (between.len() + 1) as f32
             })
         });
-        let least = least.fold(f64::INFINITY, f64::min);
-        assert!((next[to] - least).abs() < 1e-12, "{to}: {} for {least}", next[to]);
+        let least = least.fold(f32::INFINITY, f32::min);
+        assert!((next[to] - least).abs() < 1e-6, "{to}: {} for {least}", next[to]);
     }
 }

@@ -28,18 +28,21 @@ impl<T: Real, const M: usize> Union<T, M> {
     #[inline(always)]
     fn include(&mut self, share: &Jet<T, M>) {
         self.value += share.value * (T::one() - self.value);
-        let (before, missed) = (self.missed, &mut self.missed);
+        let missed = &mut self.missed;
         let kept = T::one() - share.value;
-        missed.value = before.value * kept;
+        // In place, what has the most derivatives first: it needs the others as they were.
         for a in 0..M {
-            missed.gradient[a] = before.gradient[a] * kept - before.value * share.gradient[a];
             for b in a..M {
-                missed.hessian[a][b] = before.hessian[a][b] * kept
-                    - before.value * share.hessian[a][b]
-                    - before.gradient[a] * share.gradient[b]
-                    - share.gradient[a] * before.gradient[b];
+                missed.hessian[a][b] = missed.hessian[a][b] * kept
+                    - missed.value * share.hessian[a][b]
+                    - missed.gradient[a] * share.gradient[b]
+                    - share.gradient[a] * missed.gradient[b];
             }
         }
+        for a in 0..M {
+            missed.gradient[a] = missed.gradient[a] * kept - missed.value * share.gradient[a];
+        }
+        missed.value *= kept;
     }
 
     #[inline]
@@ -57,6 +60,10 @@ pub(super) fn detected<T: Real, const DIM: usize, const M: usize>(
     samples: &[Sample<T, DIM>],
     variables: &Variables,
 ) -> Jet<T, M> {
+    let is_common = M == DIM && *variables == Variables::POSITION && situation.betrayal == Betrayal::None;
+    if is_common && !cfg!(feature = "compact") {
+        return detected_at(scenario, situation, samples);
+    }
     let heard = Jet::variable(situation.dropout, variables.dropout).affine(-T::one(), T::one());
     let level = Jet::variable(situation.level, variables.level);
     let mut union = Union::new();
@@ -72,8 +79,43 @@ pub(super) fn detected<T: Real, const DIM: usize, const M: usize>(
             Betrayal::None => silent,
             other => betrayed_jet(other, &sensor.jam, &silent, &level, &square),
         };
-        let share =
-            if variables.dropout.is_some() { loud.times(&heard) } else { loud.affine(heard.value, T::zero()) };
+        if variables.dropout.is_some() {
+            union.include(&loud.times(&heard));
+        } else if situation.dropout == T::zero() {
+            union.include(&loud);
+        } else {
+            union.include(&loud.affine(heard.value, T::zero()));
+        }
+    }
+    union.into_jet()
+}
+
+/// The same by the position alone, without jamming: the common case, written out, so that it stays in registers.
+#[inline(always)]
+fn detected_at<T: Real, const DIM: usize, const M: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    samples: &[Sample<T, DIM>],
+) -> Jet<T, M> {
+    let (two, heard) = (T::real(2.0), T::one() - situation.dropout);
+    let pooling = &scenario.frame.pooling;
+    let mut union = Union::new();
+    for (sensor, sample) in scenario.sensors.iter().zip(samples) {
+        let Some(model) = sensor.detection.as_ref().filter(|detection| !pooling.takes(detection)) else {
+            continue;
+        };
+        // d^2 has the derivatives 2 (x - y) and 2 I.
+        let Probability { value, slope, bend } = detector::detection(model, sample.square);
+        let (slope, bend) = (two * slope * heard, two * two * bend * heard);
+        let mut share = Jet::constant(value * heard);
+        let offset = &sample.offset;
+        for a in 0..M.min(DIM) {
+            share.gradient[a] = slope * offset[a];
+            for b in a..M.min(DIM) {
+                share.hessian[a][b] = bend * offset[a] * offset[b];
+            }
+            share.hessian[a][a] += slope;
+        }
         union.include(&share);
     }
     union.into_jet()
