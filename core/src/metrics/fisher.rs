@@ -132,16 +132,27 @@ fn factor<T: Real, const DIM: usize>(
     let floor = T::real(INFO_FLOOR);
     let mut rows = [Point::<T, DIM>::zeros(); DIM];
     let mut pivots = Point::<T, DIM>::zeros();
+    // The first mean of a column depends on no other: all at once.
+    let mut means = Point::<T, DIM>::zeros();
+    for sample in samples.iter() {
+        means += sample.residual * sample.weight;
+    }
+    means /= weight_sum;
+    for sample in samples.iter_mut() {
+        sample.residual -= means;
+    }
     for l in 0..DIM {
         rows[l][l] = T::one();
-        for _ in 0..2 {
-            let mut mean = T::zero();
-            for sample in samples.iter() {
-                mean += sample.weight * sample.residual[l];
-            }
-            mean /= weight_sum;
-            for sample in samples.iter_mut() {
-                sample.residual[l] -= mean;
+        for round in 0..2 {
+            if round > 0 {
+                let mut mean = T::zero();
+                for sample in samples.iter() {
+                    mean += sample.weight * sample.residual[l];
+                }
+                mean /= weight_sum;
+                for sample in samples.iter_mut() {
+                    sample.residual[l] -= mean;
+                }
             }
             for k in 0..l {
                 let mut product = floor * rows[k].dot(&rows[l]);

@@ -23,7 +23,7 @@ pub struct Variance<T> {
 }
 
 /// Variance at the squared distance `square`. Source: (8), (10).
-#[inline]
+#[inline(always)]
 #[must_use]
 pub fn variance<T: Real>(ranging: &Ranging<T>, square: T) -> Variance<T> {
     match *ranging {

@@ -181,7 +181,7 @@ fn keep(number: u8, totals: &[f32; CHUNK], next: &mut [f32], parents: &mut [u8])
         *better = if is_better { u8::MAX } else { 0 };
         *best = if is_better { total } else { *best };
     }
-    for (parent, better) in parents.iter_mut().zip(better) {
+    for (parent, &better) in parents.iter_mut().zip(&better) {
         *parent = *parent & !better | number & better;
     }
 }
