@@ -247,3 +247,62 @@ fn copy_entry<V: Copy>(from: &[V], at: usize, to: &mut [V], end: usize) {
         *slot = entry;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{
+        Agent, AgentSet, Domain, Draft, Pooling, Reduce, ReferencePoint, Scenario, Sense, Term, Timing, Window,
+    };
+    use crate::scenario::{Detection, Metric, Motion, Sensor, Susceptibility};
+
+    #[test]
+    fn a_straight_line_is_laid_over_what_was_there() {
+        let place = |x: f64, y: f64| Point::<f64, 2>::new(x, y);
+        let jam = Susceptibility { error_gain: 0.0, error_exponent: 2.0, detect_gain: 0.0, detect_exponent: 2.0 };
+        let detection = Some(Detection::Proxy { scale: 0.3, epsilon: 0.3, path_loss: 2.0 });
+        let sensor = Sensor { motion: Motion::Fixed(place(5.0, 4.0)), ranging: None, detection, jam };
+        let agent = Agent {
+            start: place(1.0, 5.0),
+            goal: place(9.0, 5.0),
+            start_velocity: None,
+            speed_max: 0.1,
+            accel_max: 0.02,
+            weight: 1.0,
+            jammer: None,
+            dropout: None,
+        };
+        let term = Term {
+            metric: Metric::Detection,
+            sense: Sense::Minimize,
+            reduce: Reduce::Integral,
+            weight: 1.0,
+            agents: AgentSet::ALL,
+            window: Window::always(),
+        };
+        let scenario = Scenario::<f64, 2, 4, 1, 0>::new(&Draft {
+            softening: 0.05,
+            reference_point: ReferencePoint::Current,
+            pooling: Pooling::None,
+            intervals: 20,
+            start_time: 0.0,
+            time: Timing { max: 200.0, target: 100.0, penalty: 1.0 },
+            domain: Domain { min: place(0.0, 0.0), max: place(10.0, 10.0) },
+            agents: &[agent],
+            sensors: &[sensor],
+            terms: &[term],
+            separation: None,
+            regions: &[],
+            limits: &[],
+        })
+        .unwrap();
+        let mut used = Trajectory::<f64, 2, 21, 1>::zeros(20, 1).unwrap();
+        let track = &mut used.tracks[0];
+        track.path.fill(place(3.0, 3.0));
+        track.jam.fill(0.5);
+        track.azimuth.fill(0.5);
+        track.dropout.fill(0.5);
+        used.lay_straight(&scenario.view(), 100.0).unwrap();
+        assert_eq!(used, Trajectory::straight(&scenario.view(), 100.0).unwrap());
+    }
+}

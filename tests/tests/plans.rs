@@ -1,7 +1,10 @@
 //! Scenarios are planned feasibly, with claims that hold, and as well as the reference.
 
 use quietpath_bridge::file::PlanFile;
-use quietpath_bridge::planning::{Assessment, Options, Planned, Precision, Rollout, Status, assess, improve, plan};
+use quietpath_bridge::planning::{
+    Assessment, Memory, Options, Planned, Precision, Rollout, Status, assess, improve, plan, renew,
+};
+use quietpath_tests::bench::published::moved;
 use quietpath_tests::figures::references;
 use quietpath_tests::instances::instance;
 use quietpath_tests::scenario;
@@ -39,6 +42,10 @@ const PLANNED: [&str; 25] = [
 const GAP_MAX: f64 = 1e-3;
 /// Largest difference of the claimed objective from the recomputed one, relative to max(1, |objective|).
 const CLAIM_ERROR_MAX: f64 = 1e-9;
+
+/// Steps of the refinement that a replan may take where the world changed a little: what it took before its barrier was
+/// chosen step by step was 21 and more.
+const REPLAN_STEPS_MAX: usize = 16;
 
 /// Plans a scenario, writes the plan, reads it back and weighs it.
 fn planned(name: &str, precision: Precision) -> (Planned, Assessment) {
@@ -110,6 +117,22 @@ fn a_late_way_is_found_where_there_is_none_in_time() {
     let planned = plan(&scenario, &Options::default()).expect("planned");
     assert!(planned.assessment.feasible, "{:?}", planned.status);
     assert!(planned.plan.duration > scenario.time.target, "there is no way in time");
+}
+
+#[test]
+fn a_replan_nearby_takes_few_steps() {
+    for name in
+        ["starter", "square8-detection", "square8-energy", "square8-gdop", "square8-aee", "square8-deadline-105"]
+    {
+        let earlier = planned(name, Precision::F64).0.plan;
+        let scenario = moved(&scenario(name)).expect("there is a sensor");
+        let before = assess(&scenario, &earlier, name).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let again = renew(&scenario, &earlier, &Options::default(), &mut Memory::default())
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(again.status, Status::Converged, "{name}");
+        assert!(again.assessment.objective <= before.objective, "{name}");
+        assert!(again.iterations <= REPLAN_STEPS_MAX, "{name}: {} steps", again.iterations);
+    }
 }
 
 #[test]

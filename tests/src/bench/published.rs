@@ -112,14 +112,15 @@ pub(super) fn ours(scenario: &ScenarioFile) -> Result<(Planned, f64), String> {
 }
 
 /// One basin from the straight line, which is what the peers look for: seconds and objective.
-fn near(scenario: &ScenarioFile) -> Option<(f64, f64)> {
-    let planned = renew(scenario, &starts::straight(scenario), &Options::default(), &mut Memory::default()).ok()?;
+fn near(scenario: &ScenarioFile, memory: &mut Memory) -> Option<(f64, f64)> {
+    let planned = renew(scenario, &starts::straight(scenario), &Options::default(), memory).ok()?;
     planned.assessment.feasible.then_some(())?;
     Some((planned.plan.timing?.plan_seconds, planned.assessment.objective))
 }
 
-/// Seconds of a replan from `planned` once the first sensor turned out to be elsewhere, a little.
-fn warm(scenario: &ScenarioFile, planned: &Planned) -> Option<f64> {
+/// The scenario once the first sensor turned out to be [`ELSEWHERE`]; `None` where there is none.
+#[must_use]
+pub fn moved(scenario: &ScenarioFile) -> Option<ScenarioFile> {
     let mut moved = scenario.clone();
     match &mut moved.sensors.first_mut()?.motion {
         MotionEntry::Fixed(place) => *place.first_mut()? += ELSEWHERE,
@@ -129,7 +130,14 @@ fn warm(scenario: &ScenarioFile, planned: &Planned) -> Option<f64> {
             }
         }
     }
-    let again = renew(&moved, &planned.plan, &Options::default(), &mut Memory::default()).ok()?;
+    Some(moved)
+}
+
+/// Seconds of a replan from `planned` once the first sensor turned out to be elsewhere, a little. Memory is kept from turn to turn,
+/// as it is in flight.
+fn warm(scenario: &ScenarioFile, planned: &Planned, memory: &mut Memory) -> Option<f64> {
+    let moved = moved(scenario)?;
+    let again = renew(&moved, &planned.plan, &Options::default(), memory).ok()?;
     again.plan.timing.map(|timing| timing.plan_seconds)
 }
 
@@ -142,12 +150,13 @@ fn measure(name: &str, reference: Option<Reference>, peers: &mut [(&str, Peer)],
     }
     let mut times = vec![Vec::new(); peers.len()];
     let (mut own, mut ours_times) = (ours(&scenario), Vec::new());
+    let mut memory = Memory::default();
     let (mut straight, mut near_times, mut warm_times) = (None, Vec::new(), Vec::new());
     for _ in 0..turns {
         own = ours(&scenario);
-        straight = near(&scenario);
+        straight = near(&scenario, &mut memory);
         near_times.extend(straight.map(|(seconds, _)| seconds));
-        warm_times.extend(own.as_ref().ok().and_then(|(planned, _)| warm(&scenario, planned)));
+        warm_times.extend(own.as_ref().ok().and_then(|(planned, _)| warm(&scenario, planned, &mut memory)));
         ours_times.extend(own.as_ref().map(|(_, seconds)| *seconds).ok());
         for (((_, peer), found), times) in peers.iter_mut().zip(&best).zip(&mut times) {
             if let Ok(found) = found
