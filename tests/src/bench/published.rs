@@ -118,7 +118,7 @@ fn near(scenario: &ScenarioFile, memory: &mut Memory) -> Option<(f64, f64)> {
     Some((planned.plan.timing?.plan_seconds, planned.assessment.objective))
 }
 
-/// The scenario once the first sensor turned out to be [`ELSEWHERE`]; `None` where there is none.
+/// The scenario once the first sensor turned out to be a little elsewhere; `None` where there is none.
 #[must_use]
 pub fn moved(scenario: &ScenarioFile) -> Option<ScenarioFile> {
     let mut moved = scenario.clone();
