@@ -351,7 +351,6 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         self.landscape.surveyed = Survey { is_known: is_lasting, ..key };
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
-        let most = T::real(RATE_MAX);
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
         for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape.rates) {
             if !needed.holds(&at) {
@@ -365,7 +364,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             } else {
                 field.best_rate(slice, (&center, &plan.grid.pitch), (caution, margin), scratch)
             };
-            *rate = if cost.finite() { cost.clamp_to(-most, most).to_f32() } else { f32::INFINITY };
+            *rate = stored(cost);
         }
         if caution == Caution::Through {
             return;
@@ -378,7 +377,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             }
             let rate = self.landscape.rates.get_mut(cell);
             if let Some(rate) = rate.filter(|rate| rate.finite()) {
-                *rate = rate.min(field.rate_across(slice, &place, &plan.grid.pitch, scratch).to_f32());
+                *rate = rate.min(stored(field.rate_across(slice, &place, &plan.grid.pitch, scratch)));
             }
         }
     }
@@ -565,6 +564,12 @@ impl<T: Real, const DIM: usize> Plan<T, DIM> {
             cells -= (cells / 16).max(1);
         }
     }
+}
+
+/// A running cost as a landscape holds it; infinite where it is no number.
+fn stored<T: Real>(cost: T) -> f32 {
+    let most = T::real(RATE_MAX);
+    if cost.finite() { cost.clamp_to(-most, most).to_f32() } else { f32::INFINITY }
 }
 
 /// Whether a move keeps out of all regions that are forbidden in the slice.

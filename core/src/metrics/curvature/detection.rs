@@ -79,13 +79,9 @@ pub(super) fn detected<T: Real, const DIM: usize, const M: usize>(
             Betrayal::None => silent,
             other => betrayed_jet(other, &sensor.jam, &silent, &level, &square),
         };
-        if variables.dropout.is_some() {
-            union.include(&loud.times(&heard));
-        } else if situation.dropout == T::zero() {
-            union.include(&loud);
-        } else {
-            union.include(&loud.affine(heard.value, T::zero()));
-        }
+        let share =
+            if variables.dropout.is_some() { loud.times(&heard) } else { loud.affine(heard.value, T::zero()) };
+        union.include(&share);
     }
     union.into_jet()
 }

@@ -68,6 +68,21 @@ fn wavy(view: &View<'_, f64, 2>, size: f64) -> Path {
     path
 }
 
+/// Lines are laid in memory that was used before.
+#[test]
+fn a_straight_line_is_laid_over_what_was_there() {
+    let stored = scenario();
+    let view = stored.view();
+    let mut used = wavy(&view, 0.4);
+    for track in used.active_mut() {
+        for controls in [&mut track.jam, &mut track.azimuth, &mut track.dropout] {
+            controls.fill(0.5);
+        }
+    }
+    used.lay_straight(&view, 9.0).unwrap();
+    assert_eq!(used, Path::straight(&view, 9.0).unwrap());
+}
+
 #[test]
 fn gradients_are_those_of_differences() {
     let stored = scenario();
