@@ -296,7 +296,7 @@ fn survey<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
 }
 
 /// M max(0, t_N - t_F)^2 and its derivative by t_N. Source: (29).
-fn lateness<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+pub(crate) fn lateness<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
 ) -> (T, T) {

@@ -27,15 +27,23 @@ pub(super) fn parts<T: Real, const DIM: usize, const NODES: usize, const AGENTS:
 ) -> (T, T) {
     let guard = if is_needed(scenario) { Guard::Barrier { weight: T::one() } } else { Guard::None };
     let merit = Merit { extreme: Extreme::Exact, objective: T::one(), guard };
-    let mut logs = T::zero();
-    if guard != Guard::None {
-        for_each_clearance(scenario, trajectory, |_, slack, _| logs += guard.of(slack).0);
-    }
+    let logs = clearance_logs(scenario, trajectory);
     if !logs.finite() {
         return (T::zero(), logs);
     }
     let (objective, limits) = objective::merit_parts(scenario, trajectory, &merit, scratch);
     (objective, logs + limits)
+}
+
+/// The sum of -ln g over the slacks of regions and separations, infinite outside them.
+pub(super) fn clearance_logs<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+) -> T {
+    let barrier = Guard::Barrier { weight: T::one() };
+    let mut logs = T::zero();
+    for_each_clearance(scenario, trajectory, |_, slack, _| logs += barrier.of(slack).0);
+    logs
 }
 
 /// The value of a merit, regions and separations included, and its derivatives.

@@ -50,23 +50,34 @@ pub(super) struct Source<'a, T, const DIM: usize, const NODES: usize, const AGEN
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<'_, T, DIM, NODES, AGENTS> {
-    /// Fills `system` for `agent`.
-    pub(super) fn fill(
+    /// Adds what the bounds of `agent` bring to `system`.
+    pub(super) fn bounds(
         &self,
         index: usize,
         agent: &AgentFrame<T, DIM>,
         multipliers: &mut Multipliers<T, DIM, NODES>,
         system: &mut System<T, DIM, NODES>,
-        scratch: &mut [Sample<T, DIM>],
     ) {
         let Some(offsets) = self.iterate.interior(self.frame).nth(index) else { return };
         self.balls(agent, offsets, multipliers, system);
         let domain = &self.plain.frame.domain;
         self.walls(domain, agent, offsets, multipliers, system);
         self.levels(index, agent, multipliers, system);
+    }
+
+    /// Adds what the nodes of `agent` bring; their integrals, everything that the agent affects counted.
+    pub(super) fn nodes(
+        &self,
+        index: usize,
+        agent: &AgentFrame<T, DIM>,
+        system: &mut System<T, DIM, NODES>,
+        scratch: &mut [Sample<T, DIM>],
+    ) -> T {
+        let mut sum = T::zero();
         for node in 1..=self.frame.intervals {
-            self.node(index, agent, node, system, scratch);
+            sum += self.node(index, agent, node, system, scratch);
         }
+        sum * (self.frame.interval / self.iterate.pace)
     }
 
     fn balls(
@@ -149,7 +160,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         }
     }
 
-    /// Objective, limits and worst values at a node.
+    /// Objective, limits and worst values at a node; returns its part of the objective, a second.
     fn node(
         &self,
         agent_index: usize,
@@ -157,7 +168,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         node: usize,
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
-    ) {
+    ) -> T {
         let (variables, roles) = self.variables(agent);
         let at = At { agent_index, agent, node, variables, roles: &roles };
         // Fewer layouts take less code, and more figures that are zero.
@@ -177,7 +188,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         at: &At<'_, T, DIM>,
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
-    ) {
+    ) -> T {
         let (scenario, trajectory) = (self.plain, self.trajectory);
         let time = trajectory.times.get(at.node).copied().unwrap_or_default();
         let place = Place::new(self, at, time);
@@ -185,6 +196,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let integrals = Integrals { scenario, time };
         let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &integrals, scratch);
         let jet = self.shared(jet, at);
+        let value = jet.value;
         place.add_slopes(&jet, self.frame.interval / self.iterate.pace, Target::Objective, system);
         place.add(&jet, self.frame.interval / self.iterate.pace, Share::Integral, system);
         if !scenario.limits.is_empty() {
@@ -202,6 +214,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
             let slot = worst.slot;
             place.add_worst(&jet, sign, (slack, self.barrier / slack), EXTREMES + slot, system);
         }
+        value
     }
 
     /// The jet without what other agents' jets of the same node count too: how everyone's figures change with time.

@@ -54,6 +54,8 @@ pub(super) struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     pub(super) frame: &'a Frame<T, DIM, AGENTS>,
     pub(super) extremes: Extremes<T>,
     pub(super) is_guarded: bool,
+    /// Whether the systems hold what the nodes of the iterate bring, bounds aside.
+    pub(super) is_laid: bool,
     /// Of the integral terms and the penalty, at the iterate.
     pub(super) objective: T,
     /// Sum of -ln g over all slacks, at the iterate.
@@ -257,10 +259,34 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
-        let Workspace { iterate, trial, scratch, .. } = workspace;
-        let (objective, logs) = guard::parts(self.plain, trial, scratch);
-        self.objective = objective;
-        self.logs = logs + self.bound_logs(iterate, &self.extremes, trial, scratch);
+        let Workspace { iterate, next, trial, scratch, .. } = workspace;
+        let bound_logs = self.bound_logs(iterate, &self.extremes, trial, scratch);
+        next.assign(iterate, self.frame);
+        let (objective, logs);
+        (objective, logs, self.is_laid) = self.parts(workspace);
+        (self.objective, self.logs) = (objective, logs + bound_logs);
+    }
+
+    /// What [`guard::parts`] says of `workspace.next`, which `workspace.trial` holds written out, and whether the systems then
+    /// hold what its nodes bring. They do where the objective is a sum over the nodes of one agent, which comes with its
+    /// derivatives: an iterate that is kept is not looked at twice.
+    fn parts<const NODES: usize, const SENSORS: usize>(
+        &self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> (T, T, bool) {
+        let Workspace { next, trial, scratch, turns, .. } = workspace;
+        let is_sum = self.frame.agents == 1 && self.extremes.0.is_empty() && self.scenario.limits.is_empty();
+        let refinement = turns.refinement().filter(|_| is_sum);
+        let Some(Refinement { systems, .. }) = refinement else {
+            let (objective, logs) = guard::parts(self.plain, trial, scratch);
+            return (objective, logs, false);
+        };
+        let logs = guard::clearance_logs(self.plain, trial);
+        if !logs.finite() {
+            return (T::zero(), logs, false);
+        }
+        let integrals = self.lay_nodes(&self.source(next, trial), systems, scratch);
+        (integrals + objective::lateness(self.plain, trial).0, logs, true)
     }
 
     /// Moves every multiplier along the whole step, which `workspace.candidate` is at, as far as the iterate is going to.
@@ -334,7 +360,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             .min(barrier::level_share(self.frame, iterate, candidate));
         let mut share = if bounds < T::one() { bounds * T::real(TO_BOUNDARY) } else { T::one() };
         let rounding = T::EPSILON * T::real(16.0) * merit.abs();
-        for _ in 0..HALVINGS_MAX {
+        for halving in 0..HALVINGS_MAX {
             let mut extremes = self.extremes.clone();
             for worst in &mut extremes.0 {
                 let change = step.unknowns.get(worst.agent).and_then(|unknowns| unknowns.get(EXTREMES + worst.slot));
@@ -345,12 +371,18 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             self.frame.expand(next, trial);
             let bound_logs = self.bound_logs(next, &extremes, trial, scratch);
             ledger.evaluations += 1;
-            let (objective, guard_logs) =
-                if bound_logs.finite() { guard::parts(self.plain, trial, scratch) } else { (T::zero(), T::INFINITY) };
+            let (objective, guard_logs, is_laid) = if !bound_logs.finite() {
+                (T::zero(), T::INFINITY, false)
+            } else if halving == 0 {
+                self.parts(workspace)
+            } else {
+                let (objective, logs) = guard::parts(self.plain, trial, scratch);
+                (objective, logs, false)
+            };
             let logs = bound_logs + guard_logs;
             let value = self.merit(objective, &extremes, logs);
             if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
-                (self.objective, self.logs) = (objective, logs);
+                (self.objective, self.logs, self.is_laid) = (objective, logs, is_laid);
                 self.keep_if_best(workspace, ledger);
                 self.move_multipliers(share, workspace);
                 self.range = T::real(CENTRAL_RANGE);

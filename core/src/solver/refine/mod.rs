@@ -111,6 +111,7 @@ where
         frame: &frame,
         extremes,
         is_guarded: guard::is_needed(scenario),
+        is_laid: false,
         objective: T::zero(),
         logs: T::zero(),
         barrier: if is_inside { ledger.barrier.min(first) } else { first },

@@ -11,12 +11,15 @@
 use heapless::Vec;
 
 use super::super::controls::Bound;
+use super::super::coordinates::Iterate;
 use super::super::{Ledger, Workspace, guard};
 use super::assemble::{self, Source};
 use super::central_path::CentralPath;
-use super::system::{BUDGETS, COLUMNS, Controls, EXTREMES, PACE, products};
+use super::system::{BUDGETS, COLUMNS, Controls, EXTREMES, PACE, System, products};
 use super::{Refinement, barrier};
 use crate::math::Real;
+use crate::metrics::Sample;
+use crate::trajectory::Trajectory;
 
 /// Factors tried for the shift of one system.
 pub(in crate::solver) const SHIFTS_MAX: usize = 24;
@@ -97,38 +100,20 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         (step.slope.finite() && step.slope < T::zero()).then_some(step)
     }
 
+    /// Fills the systems at the iterate, which `workspace.trial` holds written out.
     fn assemble<const NODES: usize, const SENSORS: usize>(
-        &self,
+        &mut self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) {
         let Workspace { iterate, trial, scratch, turns, .. } = workspace;
         let Some(Refinement { systems, multipliers }) = turns.refinement() else { return };
-        let source = Source {
-            plain: self.plain,
-            frame: self.frame,
-            iterate,
-            trajectory: trial,
-            extremes: &self.extremes,
-            barrier: self.barrier,
-            range: self.range,
-        };
+        let source = self.source(iterate, trial);
+        if !self.is_laid {
+            self.lay_nodes(&source, systems, scratch);
+        }
         let agents = self.frame.agent().zip(systems.iter_mut()).zip(multipliers);
         for (index, ((agent, system), multipliers)) in agents.enumerate() {
-            let [jam, azimuth, dropout] = agent.controls.map(|bound| bound != Bound::Off);
-            let controls = if jam || azimuth || dropout { Controls::Some } else { Controls::None };
-            let mut used = [false; COLUMNS];
-            used[PACE] = true;
-            used[BUDGETS] = jam;
-            used[BUDGETS + 1] = dropout;
-            for worst in self.extremes.of(index) {
-                used.iter_mut().skip(EXTREMES + worst.slot).take(1).for_each(|used| *used = true);
-            }
-            system.clear(self.frame.intervals, controls, used);
-            source.fill(index, agent, multipliers, system, scratch);
-            for worst in self.extremes.of(index) {
-                let slot = system.border_right.get_mut(EXTREMES + worst.slot);
-                slot.into_iter().for_each(|right| *right -= worst.weight);
-            }
+            source.bounds(index, agent, multipliers, system);
         }
         if self.is_guarded {
             let pace = iterate.pace;
@@ -142,6 +127,53 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 }
             });
         }
+        // A system is used up by its solution.
+        self.is_laid = false;
+    }
+
+    /// What systems are filled from at an iterate, which `trajectory` holds written out.
+    pub(super) fn source<'b, const NODES: usize>(
+        &'b self,
+        iterate: &'b Iterate<T, DIM, NODES, AGENTS>,
+        trajectory: &'b Trajectory<T, DIM, NODES, AGENTS>,
+    ) -> Source<'b, T, DIM, NODES, AGENTS> {
+        Source {
+            plain: self.plain,
+            frame: self.frame,
+            iterate,
+            trajectory,
+            extremes: &self.extremes,
+            barrier: self.barrier,
+            range: self.range,
+        }
+    }
+
+    /// Clears the systems and adds what the nodes bring, bounds aside; their integrals, where there is one agent.
+    pub(super) fn lay_nodes<const NODES: usize>(
+        &self,
+        source: &Source<'_, T, DIM, NODES, AGENTS>,
+        systems: &mut [System<T, DIM, NODES>],
+        scratch: &mut [Sample<T, DIM>],
+    ) -> T {
+        let mut sum = T::zero();
+        for (index, (agent, system)) in self.frame.agent().zip(systems).enumerate() {
+            let [jam, azimuth, dropout] = agent.controls.map(|bound| bound != Bound::Off);
+            let controls = if jam || azimuth || dropout { Controls::Some } else { Controls::None };
+            let mut used = [false; COLUMNS];
+            used[PACE] = true;
+            used[BUDGETS] = jam;
+            used[BUDGETS + 1] = dropout;
+            for worst in self.extremes.of(index) {
+                used.iter_mut().skip(EXTREMES + worst.slot).take(1).for_each(|used| *used = true);
+            }
+            system.clear(self.frame.intervals, controls, used);
+            sum += source.nodes(index, agent, system, scratch);
+            for worst in self.extremes.of(index) {
+                let slot = system.border_right.get_mut(EXTREMES + worst.slot);
+                slot.into_iter().for_each(|right| *right -= worst.weight);
+            }
+        }
+        sum
     }
 
     /// What the pace's own equation has besides the agents' parts: the intervals, the penalty, its bounds. Its right-hand side
