@@ -294,6 +294,12 @@ impl<'a, T: Real, const DIM: usize> View<'a, T, DIM> {
         Self { sensors, ..self }
     }
 
+    /// Whether every term is a cost wherever it is, as exposure is: sensors are then hills, and what tells good ways apart is the
+    /// sides on which they pass them. Where sensors are sought, or worst values count, there are good ways of many kinds on each.
+    pub(crate) fn is_avoiding(&self) -> bool {
+        self.terms.iter().all(|term| term.sense == Sense::Minimize && term.reduce == Reduce::Integral)
+    }
+
     /// Seconds that the straight lines of all agents take at full speed: t_M of section 4.4. Where nobody has anywhere to go, a
     /// little of the time there is: any shorter flight would be as good, down to none, and in no time nothing has a speed.
     pub(crate) fn shortest_flight(&self) -> T {

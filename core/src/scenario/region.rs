@@ -81,6 +81,14 @@ impl<T: Real> Region<T> {
         self.clearance(position, position).value < T::zero()
     }
 
+    /// A circle that holds its boundary: centre and radius, length units.
+    pub(crate) fn circle(&self) -> (Point<T, 2>, T) {
+        match &self.shape {
+            Shape::Circle { center, radius } => (*center, *radius),
+            Shape::Polygon(polygon) => polygon.circle(),
+        }
+    }
+
     /// How far a horizontal position is from the wrong side, at a time when the region applies, length units: where it
     /// is on the wrong side, less how far it is from the right one.
     #[must_use]

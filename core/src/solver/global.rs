@@ -3,18 +3,21 @@
 //! Limits: lattice paths end once [`IDLE_MAX`] in a row brought nothing. A team is searched agent by agent, each with
 //! the others frozen: in every order where it is small and its agents affect each other, and once more where it is large.
 
+use heapless::Vec;
+
 use crate::constraints::region::horizontal;
 use crate::constraints::{Constraint, separation};
 use crate::math::{Point, Real, norm};
 use crate::objective::{self, Extreme};
 use crate::scenario::View;
 use crate::trajectory::Trajectory;
-use crate::warm_start::{self, Lattice, Prices, Variant};
+use crate::warm_start::{self, Lattice, Prices, ROUTES_MAX, Routes, Variant};
 
 use super::coordinates::Frame;
 use super::feasible::largest_share;
 use super::projection::Request;
 use super::race::{EQUIPS_MAX, Race, equip, equip_anew, has_equipment};
+use super::sides::Sides;
 use super::{Ledger, Obstacle, Settings, Status, Workspace, guard, projected_gradient};
 
 /// Candidates that are polished at most, of all that are laid.
@@ -61,12 +64,17 @@ where
     }
     workspace.base.assign(&workspace.best);
     let mut race = Race::new(scenario, settings);
-    race.run(workspace, ledger, deadline);
-    let mut way = Way::Unknown;
     let mut hurried = warm_start::variants(scenario);
     hurried.truncate(settings.variants.max(1));
+    // A line that is clear waits for ways that are laid: where one of them passes everything on the same sides, it is better.
+    let is_clear = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) > T::zero();
+    let line_waits = is_clear && race.is_avoiding && hurried.iter().all(|variant| variant.others.is_some());
+    if !line_waits {
+        race.run(workspace, ledger, deadline);
+    }
+    let mut way = Way::Unknown;
     for order in 0..orders(scenario) {
-        race.idle = 0;
+        (race.idle, race.laid) = (0, 0);
         for (number, variant) in
             hurried.iter().copied().chain(unhurried(scenario).take(settings.variants)).enumerate()
         {
@@ -76,26 +84,21 @@ where
             if deadline() || is_settled || is_late {
                 break;
             }
+            if number == hurried.len() {
+                race.laid = 0;
+            }
             // What closes one variant's way may leave another's open, and the straight line competes in any case.
             let laid = lay(scenario, &variant, (order, &prices), workspace);
-            way = way.after(laid, variant.duration);
-            if laid.is_ok() && has_equipment(scenario) {
-                let mut newer = prices;
-                equip(scenario, workspace, &mut newer);
-                if matches!(race.polished, 0) {
-                    // Those of a straight line may be far off. From then on they stay, so that costs are the same.
-                    prices = newer;
-                }
-            }
-            race.idle += 1;
-            if laid.is_ok()
-                && let Some(objective) = project(scenario, settings, workspace, ledger)
-                && race.admits(objective, workspace)
-            {
-                workspace.best.assign(&workspace.trial);
-                race.run(workspace, ledger, deadline);
-            }
+            way = way.after(laid.as_ref().map(|_| ()).map_err(|by| *by), variant.duration);
+            let Ok(Some(routes)) = laid else {
+                race.idle += 1;
+                continue;
+            };
+            race_routes(scenario, &mut race, &routes, &mut prices, workspace, ledger, deadline);
         }
+    }
+    if line_waits {
+        race.run_line(workspace, ledger, deadline);
     }
     if race.found.status == Status::Infeasible && matches!(way, Way::Open) {
         race.clear(workspace, ledger, deadline);
@@ -116,6 +119,55 @@ where
         }
     }
     (status, None)
+}
+
+/// Polishes what is new of the ways of one search; the cheapest is in `workspace.trial` already.
+fn race_routes<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    race: &mut Race<'_, T, DIM>,
+    routes: &Routes<T, DIM>,
+    prices: &mut [Prices<T>; AGENTS],
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) where
+    T: Real,
+{
+    let mut seen = Vec::<Sides, ROUTES_MAX>::new();
+    for number in 0..routes.len() {
+        if deadline() || race.laid >= race.settings.variants.max(1) {
+            return;
+        }
+        if number > 0 {
+            // Only an agent that is alone has more than one.
+            let alone = prices.first().copied().unwrap_or_default();
+            let Workspace { base, trial, scratch, .. } = &mut *workspace;
+            trial.assign(base);
+            routes.lay(number, scenario, trial, (0, alone), scratch);
+        }
+        let sides = Sides::of(scenario, &workspace.trial);
+        // Where none has come clear yet, another flight time of the same way may.
+        let is_open = race.found.status != Status::Infeasible;
+        if race.is_avoiding && is_open && seen.contains(&sides) {
+            continue;
+        }
+        let _ = seen.push(sides);
+        (race.idle, race.laid) = (race.idle + 1, race.laid + 1);
+        if has_equipment(scenario) {
+            let mut newer = *prices;
+            equip(scenario, workspace, &mut newer);
+            if matches!(race.polished, 0) {
+                // Those of a straight line may be far off. From then on they stay, so that costs are the same.
+                *prices = newer;
+            }
+        }
+        if let Some(objective) = project(scenario, race.settings, workspace, ledger)
+            && race.admits(objective, workspace)
+        {
+            workspace.best.assign(&workspace.trial);
+            race.run(workspace, ledger, deadline);
+        }
+    }
 }
 
 /// Challenges the champion by what is near it; in a large team, where that is much, by ways that know the others'.
@@ -220,26 +272,28 @@ fn orders<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> usize {
     if has_jammers { orders_max(agents) } else { 1 }
 }
 
-/// Lattice paths of all agents, one after the other, into `workspace.trial`.
+/// Lattice paths of all agents, one after the other, into `workspace.trial`; the last one's ways, of which there may be more
+/// than one where it is alone.
 fn lay<T: Real, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     variant: &Variant<T>,
     (order, prices): (usize, &[Prices<T>; AGENTS]),
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
-) -> Result<(), Obstacle<T, DIM>> {
+) -> Result<Option<Routes<T, DIM>>, Obstacle<T, DIM>> {
     let Workspace { base, trial, landscape, turns, scratch, .. } = workspace;
     trial.assign(base);
-    let Some(tables) = turns.lattice() else { return Ok(()) };
+    let mut routes = None;
+    let Some(tables) = turns.lattice() else { return Ok(routes) };
     let mut lattice = Lattice { landscape, tables };
     let agents = scenario.agents.len();
     for place in 0..agents {
         let agent = at_place(order, place, agents);
         let prices = prices.get(agent).copied().unwrap_or_default();
         let found = warm_start::search(scenario, trial, agent, (variant, prices), &mut lattice, scratch);
-        found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?;
+        routes = Some(found.map_err(|obstruction| Obstacle::closing(agent, &obstruction))?);
     }
     keep_right(scenario, trial);
-    Ok(())
+    Ok(routes)
 }
 
 /// Moves the paths of agents that meet head-on to their right by half of the least distance, less near their ends.

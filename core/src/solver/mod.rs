@@ -44,6 +44,7 @@ mod projection;
 mod race;
 mod refine;
 mod settings;
+mod sides;
 mod start;
 mod turns;
 mod workspace;
@@ -169,6 +170,7 @@ where
         inside: T::one(),
         times: Times::Free,
         patience: 0,
+        has_rival: false,
         keeps: Keeps::Better,
     };
     let (status, closing) = if !first.finite() {
@@ -271,6 +273,8 @@ struct Ledger<T> {
     times: Times,
     /// Steps that a refinement takes beyond its limit while it has gained nothing or is not at a second barrier parameter.
     patience: usize,
+    /// Whether a refinement ends once it comes to the way of `workspace.champion`.
+    has_rival: bool,
     keeps: Keeps,
 }
 

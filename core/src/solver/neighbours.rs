@@ -16,7 +16,7 @@ use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real, norm};
-use crate::scenario::{Shape, View, Window};
+use crate::scenario::{View, Window};
 use crate::trajectory::Trajectory;
 
 /// Things whose other side is tried, nearest first.
@@ -105,10 +105,7 @@ fn nearest<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
                 let sensor = scenario.sensors.get(sensor)?;
                 (horizontal(&scenario.sensor_state(sensor, time).0), T::zero())
             }
-            By::Region(region) => match scenario.regions.get(region)?.shape {
-                Shape::Circle { center, radius } => (center, radius),
-                Shape::Polygon(polygon) => polygon.circle(),
-            },
+            By::Region(region) => scenario.regions.get(region)?.circle(),
         };
         let offset = middle - horizontal(place);
         if best.as_ref().is_none_or(|best| norm(&offset) < norm(&best.offset)) {

@@ -13,6 +13,7 @@ use crate::trajectory::Trajectory;
 use crate::warm_start::{self, LARGE_TEAM, Level, Prices};
 
 use super::global::project;
+use super::sides::Sides;
 use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbours, refine};
 
 /// Projected-gradient iterations of one candidate.
@@ -36,10 +37,12 @@ const ANEW: f64 = 0.01;
 const ELSEWHERE: f64 = 0.1;
 /// Times that a plan moves on to another flight time at which other nodes are before an instant.
 pub(super) const RETIMES_MAX: usize = 4;
-/// Lattice paths polished that are remembered.
-const KNOWN_MAX: usize = 16;
-/// Largest distance of two paths that go the same way, over their length.
+/// Ways polished that are remembered.
+const KNOWN_MAX: usize = 32;
+/// Largest distance of two paths that go the same way, over their length,
 const ALIKE: f64 = 0.04;
+/// and of one that has come to the other's.
+const JOINED: f64 = 0.01;
 /// Largest difference of their levels, over the larger ones.
 const ALIKE_LEVELS: f64 = 0.5;
 
@@ -86,13 +89,16 @@ pub(super) struct Race<'a, T, const DIM: usize> {
     ways: Ways,
     /// Least objective of all that were laid, before they were polished.
     promise: T,
-    /// Objectives of those that were polished, as they were laid: what has one of them to the last bit is the same once more,
-    /// as where two flight times or two orders of a team come out alike.
-    known: Vec<T, KNOWN_MAX>,
+    /// Whether sides tell ways apart: see [`View::is_avoiding`].
+    pub(super) is_avoiding: bool,
+    /// On which sides of things all passed that were polished, before and after, with the least objective as they were laid.
+    known: Vec<(Sides, T), KNOWN_MAX>,
     /// Lattice paths polished.
     pub(super) polished: usize,
     /// Lattice paths in a row that brought nothing.
     pub(super) idle: usize,
+    /// Lattice paths laid, of as many as the settings allow.
+    pub(super) laid: usize,
 }
 
 impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
@@ -106,14 +112,16 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
             second: none,
             ways: Ways::All,
             promise: T::INFINITY,
+            is_avoiding: scenario.is_avoiding(),
             known: Vec::new(),
             polished: 0,
             idle: 0,
+            laid: 0,
         }
     }
 
-    /// Whether `workspace.trial` is worth polishing: it is one of the first, or promises more than all before, was not
-    /// polished before, and does not go where the champion goes.
+    /// Whether `workspace.trial`, whose objective it is, is worth polishing: it is one of the first, or promises more than all
+    /// before, and is new.
     pub(super) fn admits<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
         &mut self,
         objective: T,
@@ -121,15 +129,34 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
     ) -> bool {
         let is_record = objective < self.promise;
         self.promise = self.promise.min(objective);
-        let is_alike = self.found.status != Status::Infeasible && is_alike(&workspace.trial, &workspace.champion);
-        let is_known = is_alike || self.known.contains(&objective);
-        let admits = (is_record || self.polished < self.settings.candidates) && !is_known;
+        let is_wanted = is_record || self.polished < self.settings.candidates;
+        let admits = is_wanted && !self.is_alike(&workspace.trial, workspace) && self.is_new(objective, workspace);
         if admits {
             self.polished += 1;
-            // One that is not remembered may be polished twice.
-            let _ = self.known.push(objective);
         }
         admits
+    }
+
+    /// Whether `workspace.trial`, whose objective it is, goes a way that was not polished before, or goes it better than what was.
+    /// Where sides do not tell ways apart, only the same once more is not new, as where two flight times or two orders of a team
+    /// come out alike.
+    fn is_new<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &self,
+        objective: T,
+        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> bool {
+        let sides = Sides::of(self.scenario, &workspace.trial);
+        let is_better = |laid: T| if self.is_avoiding { objective < laid } else { objective != laid };
+        self.known.iter().all(|&(known, laid)| known != sides || is_better(laid))
+    }
+
+    /// Whether a trajectory goes where the champion goes.
+    fn is_alike<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &self,
+        trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+        workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ) -> bool {
+        self.found.status != Status::Infeasible && is_alike(trajectory, &workspace.champion, ALIKE)
     }
 
     /// Polishes `workspace.best` for a few iterations; it becomes the champion if it is the best so far.
@@ -140,6 +167,22 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         deadline: &mut dyn FnMut() -> bool,
     ) {
         self.run_for(self.settings.iterations.min(POLISH_ITERATIONS), workspace, ledger, deadline);
+    }
+
+    /// Polishes the line `workspace.base`, where nothing was found, or nothing that passes everything on the same sides.
+    pub(super) fn run_line<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+        &mut self,
+        workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+        ledger: &mut Ledger<T>,
+        deadline: &mut dyn FnMut() -> bool,
+    ) {
+        workspace.trial.assign(&workspace.base);
+        ledger.evaluations += 1;
+        let objective = objective::value(self.scenario, &workspace.trial, Extreme::Exact, &mut workspace.scratch);
+        if self.found.status == Status::Infeasible || self.is_new(objective, workspace) {
+            workspace.best.assign(&workspace.trial);
+            self.run(workspace, ledger, deadline);
+        }
     }
 
     fn run_for<const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
@@ -158,12 +201,18 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         ledger.patience = if settings.refinements > POLISH_REFINEMENTS && !is_large { PATIENCE } else { 0 };
         let first = ledger.first;
         ledger.first = first * T::real(CANDIDATE);
+        ledger.has_rival = found.status != Status::Infeasible;
+        let (sides, laid) = (Sides::of(scenario, &workspace.best), ledger.best);
         let status = polish(scenario, &short, workspace, ledger, deadline);
-        (ledger.first, ledger.patience) = (first, 0);
-        let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion);
+        (ledger.first, ledger.patience, ledger.has_rival) = (first, 0, false);
+        let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion, ALIKE);
         let level = if is_alike { found.level } else { ledger.best };
         let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
         let has_plan = !matches!(status, Status::Infeasible | Status::NonFinite);
+        if has_plan {
+            remember(&mut self.known, sides, laid);
+            remember(&mut self.known, Sides::of(scenario, &workspace.best), laid);
+        }
         if has_plan && (new.least < found.least || found.least == T::INFINITY) {
             if !is_alike && self.ways == Ways::All {
                 self.second = *found;
@@ -212,7 +261,10 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
             }
             workspace.trial.assign(&workspace.champion);
             let is_changed = neighbours::change_side(self.scenario, &mut workspace.trial, &passed);
-            if is_changed && project(self.scenario, self.settings, workspace, ledger).is_some() {
+            if is_changed
+                && let Some(objective) = project(self.scenario, self.settings, workspace, ledger)
+                && self.is_new(objective, workspace)
+            {
                 workspace.best.assign(&workspace.trial);
                 self.run(workspace, ledger, deadline);
             }
@@ -342,17 +394,38 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
     }
 }
 
-/// Whether two trajectories go the same way, side by side, in about the same time, and do about the same on it.
+/// Remembers a way that was polished, and what it was worth as it was laid.
+fn remember<T: Real>(known: &mut Vec<(Sides, T), KNOWN_MAX>, sides: Sides, laid: T) {
+    if let Some((_, least)) = known.iter_mut().find(|(known, _)| *known == sides) {
+        *least = least.min(laid);
+        return;
+    }
+    // What is not remembered may be polished twice.
+    let _ = known.push((sides, laid));
+}
+
+/// Whether a refinement has come to the way of the champion, so that there is no more to learn from it.
+pub(super) fn has_joined<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    champion: &Trajectory<T, DIM, NODES, AGENTS>,
+) -> bool {
+    is_alike(trajectory, champion, JOINED) && Sides::of(scenario, trajectory) == Sides::of(scenario, champion)
+}
+
+/// Whether two trajectories go the same way, side by side, in about the same time, no farther apart than `part` of their
+/// length, and do about the same on it.
 fn is_alike<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
     one: &Trajectory<T, DIM, NODES, AGENTS>,
     other: &Trajectory<T, DIM, NODES, AGENTS>,
+    part: f64,
 ) -> bool {
     let nodes = one.nodes();
     one.active().iter().zip(other.active()).all(|(one, other)| {
         let steps = one.path.iter().zip(one.path.iter().skip(1)).take(nodes - 1);
         let length = steps.fold(T::zero(), |length, (from, to)| length + norm(&(to - from)));
         let apart = one.path.iter().zip(&other.path).take(nodes).map(|(one, other)| norm(&(one - other)));
-        let is_aside = apart.fold(T::zero(), T::max) < length * T::real(ALIKE);
+        let is_aside = apart.fold(T::zero(), T::max) < length * T::real(part);
         let is_equipped = |one: &[T; NODES], other: &[T; NODES]| {
             let levels = one.iter().zip(other).take(nodes);
             let differ = levels.clone().fold(T::zero(), |sum, (&one, &other)| sum + (one - other).abs());

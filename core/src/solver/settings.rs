@@ -8,7 +8,7 @@ use super::global::CANDIDATES_MAX;
 /// Bounds on the planner's work. Iteration counts, not clocks: the same settings give the same plan everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings<T> {
-    /// Largest number of lattice searches of [`super::Start::Global`] for each penalty on lateness; at least one is made.
+    /// Largest number of lattice paths that [`super::Start::Global`] lays for each penalty on lateness; at least one is laid.
     pub variants: usize,
     /// Number of lattice paths that [`super::Start::Global`] polishes whatever they promise; later ones it polishes where they
     /// promise more than all before. With more than one, the best is challenged, and the best two are polished to the end.
@@ -28,7 +28,7 @@ pub struct Settings<T> {
 }
 
 impl<T: Real> Settings<T> {
-    /// Little work, for a microcontroller: two lattice searches, the better of which is polished, a tenth of the default
+    /// Little work, for a microcontroller: two lattice paths, the better of which is polished, a tenth of the default
     /// iterations or fewer, and a coarse end.
     #[must_use]
     pub fn frugal() -> Self {

@@ -408,6 +408,11 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Slice<T, DIM, AGENTS> {
         self.time
     }
 
+    /// The end of the slice, s.
+    pub(super) fn end(&self) -> T {
+        self.window.until
+    }
+
     /// Coefficients of the terms: slices with the same cost the same, where nothing moves.
     pub(super) fn weights(&self) -> Weights<T> {
         self.own

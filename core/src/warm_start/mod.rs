@@ -8,6 +8,9 @@
 //!
 //! where the running cost is the scenario's own at the slice's time. Start and goal are exact points. The result
 //! keeps the reach per slice, not the acceleration bound, and is there to be projected on the bounds and polished.
+//! A sweep knows the cheapest way for every number of slices, so that one is enough for all flight times of an agent that is
+//! alone among sensors to be avoided. Elsewhere each has a sweep of its own: costs of worst-case terms and of other agents
+//! depend on the flight time, and sensors that are sought have many good ways, of which different sweeps find different ones.
 //!
 //! | symbol | name | unit | shape |
 //! |---|---|---|---|
@@ -35,7 +38,7 @@ use heapless::Vec;
 
 use crate::math::{Point, Real, norm};
 use crate::metrics::Sample;
-use crate::scenario::{Reduce, View};
+use crate::scenario::{Agent, Domain, Reduce, View};
 use crate::trajectory::Trajectory;
 
 use field::{Field, SHARPNESS, Slice, Weights};
@@ -51,10 +54,15 @@ pub use obstruction::{Blocked, Obstruction};
 pub const VARIANTS_MAX: usize = 8;
 /// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
 const INFLATION_MAX: f64 = 1.25;
-/// Fewest slices of a flight.
+/// Fewest and most slices of a flight.
 const SLICES_MIN: usize = 2;
+const SLICES_MAX: usize = 72;
+/// Flight times of one sweep that are kept, those of the cheapest ways.
+pub(crate) const ROUTES_MAX: usize = 8;
 /// Largest running cost of a cell: sums of them are finite in single precision.
 const RATE_MAX: f64 = 1e30;
+/// Times that the corners of a path are rounded, each over one node to either side.
+const ROUNDINGS: usize = 2;
 /// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
 const FREE: f64 = 1e-3;
 
@@ -69,6 +77,25 @@ pub struct Variant<T> {
     pub duration: T,
     /// Flight time that the grid is laid for, s: variants that share one share its costs.
     pub span: T,
+    /// The shortest and the longest of other flight times that the sweep looks at too, s; `None` where costs depend on it.
+    pub others: Option<[T; 2]>,
+}
+
+/// Ways of one sweep, the cheapest first.
+#[derive(Clone, Debug)]
+pub(crate) struct Routes<T, const DIM: usize> {
+    plan: Plan<T, DIM>,
+    list: Vec<Route<T>, ROUTES_MAX>,
+}
+
+/// The cheapest way of so many slices.
+#[derive(Clone, Debug)]
+struct Route<T> {
+    /// Penalty on late arrival included.
+    cost: T,
+    slices: usize,
+    /// Where it is after every slice but the last, the last of them first.
+    cells: Vec<u16, SLICES_MAX>,
 }
 
 /// How blocked cells are told from free ones.
@@ -121,11 +148,16 @@ struct Survey<T> {
 #[derive(Clone, Copy, Debug)]
 struct Plan<T, const DIM: usize> {
     grid: Grid<T, DIM>,
+    /// Slices of the longest flight time.
     slices: usize,
+    /// Slices of the shortest.
+    fewest: usize,
     /// Distance that one slice reaches, length units.
     reach: T,
     /// Length of a slice, s.
     interval: T,
+    /// The longest flight time, s.
+    longest: T,
     /// Longest way that any variant on this grid goes, length units.
     farthest: T,
 }
@@ -143,6 +175,17 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
     let at = |share: f64| least + (most - least) * T::real(share);
     let late = |part: f64| (most * T::real(1.0 + part)).min(allowed);
     let roomy = if is_urged { late(0.06) } else { at(0.5) };
+    let mut all = Vec::new();
+    // One sweep for all flight times finds the best way for each; what it does not find are others that are nearly as good.
+    if scenario.agents.len() == 1 && scenario.is_avoiding() {
+        let until = if is_urged { late(0.06) } else { most };
+        for (reach, inflation) in [(4.0, 1.12), (3.5, 1.0)] {
+            let (reach, inflation) = (T::real(reach), T::real(inflation));
+            let others = Some([least, until]);
+            let _ = all.push(Variant { reach, inflation, duration: most, span: until, others });
+        }
+        return all;
+    }
     let list = if is_urged {
         [
             (4.0, 1.12, at(1.0)),
@@ -166,20 +209,20 @@ pub fn variants<T: Real, const DIM: usize>(scenario: &View<'_, T, DIM>) -> Vec<V
             (4.5, 1.25, at(0.8)),
         ]
     };
-    let mut all = Vec::new();
     // A large team takes one way, with time to spare: whatever is laid costs as much as the team is large.
     let list = if scenario.agents.len() < LARGE_TEAM { list } else { [(4.0, 1.12, roomy); VARIANTS_MAX] };
     let span = list.iter().fold(T::zero(), |span, &(_, _, duration)| span.max(duration));
     let count = if scenario.agents.len() < LARGE_TEAM { VARIANTS_MAX } else { 1 };
     for (reach, inflation, duration) in list.into_iter().take(count) {
+        let (reach, inflation) = (T::real(reach), T::real(inflation));
         // There is room for as many as are listed.
-        let _ = all.push(Variant { reach: T::real(reach), inflation: T::real(inflation), duration, span });
+        let _ = all.push(Variant { reach, inflation, duration, span, others: None });
     }
     all
 }
 
-/// Finds the cheapest lattice path of `agent` and writes it, at equal times, to its track in `trajectory`, with the
-/// variant's flight time; returns its estimated cost, the penalty on late arrival included.
+/// Finds the cheapest lattice path of `agent` for each flight time of a variant, and writes the cheapest of them, at equal
+/// times, to its track in `trajectory`, with its flight time.
 ///
 /// `trajectory` must be of the scenario's size, with some path in every track: the other agents keep theirs, and that
 /// of `agent` is where worst-case terms start from. Levels of jamming and dropout stay what they are: see [`equip`].
@@ -200,36 +243,79 @@ pub(crate) fn search<
     (variant, prices): (&Variant<T>, Prices<T>),
     lattice: &mut Lattice<'_, T, CELLS, PARENTS>,
     scratch: &mut [Sample<T, DIM>],
-) -> Result<T, Obstruction<T, DIM>>
+) -> Result<Routes<T, DIM>, Obstruction<T, DIM>>
 where
     T: Real,
 {
-    let frame = &scenario.frame;
-    trajectory.set_duration(frame.start_time, variant.duration);
+    let nowhere = |agent: Option<&Agent<T, DIM>>| Obstruction {
+        by: Blocked::Time,
+        position: agent.map_or(Point::zeros(), |agent| agent.goal),
+        time: scenario.frame.start_time + variant.duration,
+    };
+    let Some(equipped) = scenario.agents.get(agent) else { return Err(nowhere(None)) };
+    let plan = Plan::new(&scenario.frame.domain, equipped, variant, (CELLS, PARENTS));
     let has_extremes = scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme);
     let passes = if has_extremes { SHARPNESS.len() } else { 1 };
-    let late = (frame.start_time + variant.duration - frame.time.target).max(T::zero());
     let is_open = scenario.regions.is_empty() && scenario.limits.is_empty();
     for caution in [Caution::Careful, Caution::Bold] {
         let mut found = None;
         for pass in 0..passes {
-            found = lattice.pass(scenario, trajectory, (agent, prices), (variant, caution, pass), scratch).ok();
+            found = lattice.pass(scenario, trajectory, (agent, prices), (&plan, caution, pass), scratch);
             if found.is_none() {
                 break;
             }
         }
-        if let Some(cost) = found {
-            return Ok(cost + frame.time.penalty * late * late);
+        if let Some(found) = found {
+            return Ok(found);
         }
         if is_open {
             break;
         }
     }
-    let position = scenario.agents.get(agent).map_or(Point::zeros(), |agent| agent.goal);
-    let out_of_time = Obstruction { by: Blocked::Time, position, time: frame.start_time + variant.duration };
-    match lattice.pass(scenario, trajectory, (agent, prices), (variant, Caution::Through, 0), scratch) {
-        Ok(_) => Err(first_blocked(scenario, trajectory, agent, scratch).unwrap_or(out_of_time)),
-        Err(()) => Err(out_of_time),
+    match lattice.pass(scenario, trajectory, (agent, prices), (&plan, Caution::Through, 0), scratch) {
+        Some(_) => Err(first_blocked(scenario, trajectory, agent, scratch).unwrap_or(nowhere(Some(equipped)))),
+        None => Err(nowhere(Some(equipped))),
+    }
+}
+
+impl<T: Real, const DIM: usize> Routes<T, DIM> {
+    /// How many there are.
+    pub(crate) fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Estimated cost of the cheapest, the penalty on late arrival included.
+    #[cfg(test)]
+    pub(crate) fn cost(&self) -> T {
+        self.list.first().map_or(T::INFINITY, |route| route.cost)
+    }
+
+    /// Writes one of them, counted from the cheapest, at equal times to the track of `agent`, with its flight time.
+    pub(crate) fn lay<const NODES: usize, const AGENTS: usize>(
+        &self,
+        number: usize,
+        scenario: &View<'_, T, DIM>,
+        trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
+        (agent, prices): (usize, Prices<T>),
+        scratch: &mut [Sample<T, DIM>],
+    ) {
+        let Some(route) = self.list.get(number) else { return };
+        trajectory.set_duration(scenario.frame.start_time, self.plan.duration(route.slices));
+        let Some(field) = Field::new(scenario, trajectory, agent, prices, 0, scratch) else { return };
+        let track = trace(&field.of_lattice(), &self.plan, route, trajectory, scratch);
+        if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
+            *slot = track;
+        }
+    }
+
+    /// Keeps what is among the cheapest.
+    fn enter(&mut self, new: Route<T>) {
+        let place = self.list.iter().position(|known| new.cost < known.cost).unwrap_or(self.list.len());
+        if self.list.is_full() && place < self.list.len() {
+            self.list.pop();
+        }
+        // What is dearer than all of a full list has no place.
+        let _ = self.list.insert(place, new);
     }
 }
 
@@ -262,42 +348,41 @@ impl<const CELLS: usize, const PARENTS: usize> Tables<CELLS, PARENTS> {
 }
 
 impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PARENTS> {
-    /// One search; the path goes to the trajectory.
+    /// One search; the cheapest path goes to the trajectory.
     fn pass<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
         scenario: &View<'_, T, DIM>,
         trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
         (agent, prices): (usize, Prices<T>),
-        (variant, caution, pass): (&Variant<T>, Caution, usize),
+        (plan, caution, pass): (&Plan<T, DIM>, Caution, usize),
         scratch: &mut [Sample<T, DIM>],
-    ) -> Result<T, ()> {
-        let field = Field::new(scenario, trajectory, agent, prices, pass, scratch).ok_or(())?.of_lattice();
+    ) -> Option<Routes<T, DIM>> {
+        trajectory.set_duration(scenario.frame.start_time, plan.duration(plan.slices));
+        let field = Field::new(scenario, trajectory, agent, prices, pass, scratch)?.of_lattice();
         if field.has_tangents() {
             // Costs are those of the path before this pass.
             self.landscape.begin();
         }
-        let plan = Plan::new(&field, variant, CELLS, PARENTS);
         self.tables.moves.collect(&plan.grid, plan.reach);
-        let (cost, last) = self.sweep(&field, &plan, caution, scratch).ok_or(())?;
-        let track = self.trace(&field, &plan, last, trajectory, scratch);
-        if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
-            *slot = track;
-        }
-        Ok(cost)
+        let routes = self.sweep(&field, plan, caution, scratch)?;
+        (routes.len() > 0).then_some(())?;
+        routes.lay(0, scenario, trajectory, (agent, prices), scratch);
+        Some(routes)
     }
 
-    /// All slices; the least cost and the last cell of its path.
+    /// All slices, and the cheapest ways that come to the goal; `None` where none can.
     fn sweep<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
         field: &Field<'_, T, DIM, NODES, AGENTS>,
         plan: &Plan<T, DIM>,
         caution: Caution,
         scratch: &mut [Sample<T, DIM>],
-    ) -> Option<(T, usize)> {
+    ) -> Option<Routes<T, DIM>> {
         let (cells, counts) = (plan.grid.cells(), &plan.grid.counts);
         let count = T::from_count(plan.slices);
         let (start, goal) = (&field.agent.start, &field.agent.goal);
         let farthest = self.tables.moves.farthest();
+        let mut routes = Routes { plan: *plan, list: Vec::new() };
         let mut alive = plan.grid.around(start, T::zero())?;
         for number in 1..=plan.slices {
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
@@ -309,13 +394,20 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             } else {
                 alive.grown(farthest, counts)
             };
-            let needed = if number == plan.slices { alive.hull(&wanted) } else { reached };
+            let arrives = number >= plan.fewest;
+            let needed = if arrives { reached.hull(&plan.grid.around(goal, T::zero())?) } else { reached };
             self.survey(field, plan, (&slice, &needed), caution, scratch);
+            if arrives && let Some((cost, last)) = self.arrive(field, plan, &slice, caution) {
+                let time = &field.scenario.frame.time;
+                let late = (slice.end() - time.target).max(T::zero());
+                let cost = cost + time.penalty * late * late;
+                routes.enter(Route { cost, slices: number, cells: self.back(plan, number, last) });
+            }
             if number == plan.slices {
-                return self.arrive(field, plan, &slice, caution);
+                break;
             }
             self.tables.next.iter_mut().take(cells).for_each(|cost| *cost = f32::INFINITY);
-            let wanted = wanted.meet(&reached)?;
+            let Some(wanted) = wanted.meet(&reached) else { break };
             if number == 1 {
                 self.depart(field, plan, &slice, caution);
             } else {
@@ -324,7 +416,22 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             alive = wanted;
             core::mem::swap(&mut self.tables.cost, &mut self.tables.next);
         }
-        None
+        Some(routes)
+    }
+
+    /// The cells of a way of so many slices that ends in `last`, back to that after the first slice.
+    fn back<const DIM: usize>(&self, plan: &Plan<T, DIM>, slices: usize, last: usize) -> Vec<u16, SLICES_MAX> {
+        let cells = plan.grid.cells();
+        let (mut all, mut cell) = (Vec::new(), last);
+        for number in (SLICES_MIN..=slices).rev() {
+            // There is room for every slice, and cells are numbered with fewer bits.
+            let _ = all.push(u16::try_from(cell).unwrap_or(u16::MAX));
+            if number > SLICES_MIN {
+                let parent = self.tables.parents.get((number - 3) * cells + cell).copied().unwrap_or(0);
+                cell = self.tables.moves.origin(parent, cell);
+            }
+        }
+        all
     }
 
     /// Running cost of every cell of a block, unless it is known already.
@@ -382,28 +489,6 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         }
     }
 
-    /// Where a path that visits `cell` passes: its centre, or a sensor in it over which flying is cheaper.
-    fn waypoint<const DIM: usize, const NODES: usize, const AGENTS: usize>(
-        field: &Field<'_, T, DIM, NODES, AGENTS>,
-        plan: &Plan<T, DIM>,
-        slice: &Slice<T, DIM, AGENTS>,
-        cell: usize,
-        scratch: &mut [Sample<T, DIM>],
-    ) -> Point<T, DIM> {
-        let center = plan.grid.center_of(cell);
-        let mut best = (field.rate(slice, &center, scratch), center);
-        for sensor in field.scenario.sensors {
-            let place = field.scenario.sensor_state(sensor, slice.time()).0;
-            if plan.grid.cell(&place) == cell && plan.grid.holds(&place) {
-                let rate = field.rate_across(slice, &place, &plan.grid.pitch, scratch);
-                if rate < best.0 {
-                    best = (rate, place);
-                }
-            }
-        }
-        best.1
-    }
-
     /// The first slice: from the start itself.
     fn depart<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         &mut self,
@@ -456,8 +541,10 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
     ) -> Option<(T, usize)> {
         let goal = field.agent.goal;
         let mut best = None;
-        for ((cell, (_, center)), &before) in plan.grid.iter().enumerate().zip(&self.tables.cost) {
-            let before = T::of_f32(before);
+        let near = plan.grid.around(&goal, plan.reach)?;
+        for cell in near.rows(&plan.grid.counts).flat_map(|(first, length)| first..first + length) {
+            let before = T::of_f32(self.tables.cost.get(cell).copied().unwrap_or(f32::INFINITY));
+            let center = plan.grid.center_of(cell);
             if before == T::INFINITY || norm(&(goal - center)) > plan.reach {
                 continue;
             }
@@ -490,80 +577,117 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         }
         sum / T::from_count(count)
     }
-
-    /// The path that ends in `last`, at the trajectory's nodes, with controls.
-    fn trace<const DIM: usize, const NODES: usize, const AGENTS: usize>(
-        &self,
-        field: &Field<'_, T, DIM, NODES, AGENTS>,
-        plan: &Plan<T, DIM>,
-        last: usize,
-        trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
-        scratch: &mut [Sample<T, DIM>],
-    ) -> Option<crate::trajectory::Track<T, DIM, NODES>> {
-        let mut track = *trajectory.tracks.get(field.index)?;
-        let cells = plan.grid.cells();
-        let intervals = T::from_count(trajectory.intervals().max(1));
-        let slices = T::from_count(plan.slices);
-        let (mut cell, mut end) = (last, field.agent.goal);
-        let mut node = trajectory.intervals();
-        for number in (1..=plan.slices).rev() {
-            let first = T::from_count(number - 1) / slices;
-            let slice = field.slice(first, T::from_count(number) / slices);
-            let from =
-                if number == 1 { field.agent.start } else { Self::waypoint(field, plan, &slice, cell, scratch) };
-            while node > 0 && T::from_count(node) / intervals > first {
-                let share = (T::from_count(node) / intervals - first) * slices;
-                let position = from + (end - from) * share.min(T::one());
-                *track.path.get_mut(node)? = position;
-                node -= 1;
-            }
-            end = from;
-            if number > 2 {
-                let parent = self.tables.parents.get((number - 3) * cells + cell).copied()?;
-                cell = self.tables.moves.origin(parent, cell);
-            }
-        }
-        *track.path.first_mut()? = field.agent.start;
-        *track.path.get_mut(trajectory.intervals())? = field.agent.goal;
-        Some(track)
-    }
 }
 
 impl<T: Real, const DIM: usize> Plan<T, DIM> {
     /// Lays the grid, and cuts the flight into slices that reach about the variant's number of cells.
-    fn new<const NODES: usize, const AGENTS: usize>(
-        field: &Field<'_, T, DIM, NODES, AGENTS>,
+    fn new(
+        domain: &Domain<T, DIM>,
+        agent: &Agent<T, DIM>,
         variant: &Variant<T>,
-        cells_max: usize,
-        parents_max: usize,
+        (cells_max, parents_max): (usize, usize),
     ) -> Self {
-        let agent = field.agent;
-        let domain = &field.scenario.frame.domain;
-        let length = agent.speed_max * variant.duration;
-        let far =
+        let way = agent.speed_max * variant.duration * variant.inflation;
+        let farthest =
             agent.speed_max * variant.span.max(variant.duration) * T::real(INFLATION_MAX).max(variant.inflation);
         let mut cells = cells_max;
         loop {
-            let grid = Grid::new(domain, (&agent.start, &agent.goal), far, cells);
-            let wanted = length * variant.inflation / (grid.size() * variant.reach.max(T::one()));
-            let mut slices = SLICES_MIN;
+            let grid = Grid::new(domain, (&agent.start, &agent.goal), farthest, cells);
             // Never less than the variant's reach: a lattice that falls a little short of a whole cell loses it.
-            while T::from_count(slices + 1) <= wanted && slices < parents_max {
-                slices += 1;
-            }
-            if grid.cells() * (slices - SLICES_MIN) <= parents_max || cells <= 1 {
-                let count = T::from_count(slices);
-                return Self {
-                    grid,
-                    slices,
-                    reach: length * variant.inflation / count,
-                    interval: variant.duration / count,
-                    farthest: far,
-                };
+            let count = T::from_count(slices(way / (grid.size() * variant.reach.max(T::one()))));
+            let interval = variant.duration / count;
+            let [shortest, longest] = variant.others.unwrap_or([variant.duration; 2]);
+            // A flight time that is a whole number of slices is one more or less where it is rounded.
+            let [most, fewest] = [(longest, 1e-3), (shortest, 1.0 - 1e-3)]
+                .map(|(duration, part)| slices(duration / interval + T::real(part)));
+            if grid.cells() * (most - SLICES_MIN) <= parents_max || cells <= 1 {
+                let fewest = fewest.min(most);
+                return Self { grid, slices: most, fewest, reach: way / count, interval, longest, farthest };
             }
             cells -= (cells / 16).max(1);
         }
     }
+
+    /// Flight time of so many slices, s.
+    fn duration(&self, slices: usize) -> T {
+        (self.interval * T::from_count(slices)).min(self.longest)
+    }
+}
+
+/// As many slices as there are whole ones, but some.
+fn slices<T: Real>(wanted: T) -> usize {
+    (SLICES_MIN..SLICES_MAX).take_while(|&slices| T::from_count(slices + 1) <= wanted).count() + SLICES_MIN
+}
+
+/// A route at the trajectory's nodes.
+fn trace<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    field: &Field<'_, T, DIM, NODES, AGENTS>,
+    plan: &Plan<T, DIM>,
+    route: &Route<T>,
+    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
+    scratch: &mut [Sample<T, DIM>],
+) -> Option<crate::trajectory::Track<T, DIM, NODES>> {
+    let mut track = *trajectory.tracks.get(field.index)?;
+    let intervals = T::from_count(trajectory.intervals().max(1));
+    let count = T::from_count(route.slices);
+    let mut end = field.agent.goal;
+    let mut node = trajectory.intervals();
+    // Cells lie between slices; before the first is the start.
+    let cells = route.cells.iter().map(|&cell| Some(usize::from(cell))).chain([None]);
+    for (number, cell) in (1..=route.slices).rev().zip(cells) {
+        let first = T::from_count(number - 1) / count;
+        let slice = field.slice(first, T::from_count(number) / count);
+        let from = cell.map_or(field.agent.start, |cell| waypoint(field, plan, &slice, cell, scratch));
+        while node > 0 && T::from_count(node) / intervals > first {
+            let share = (T::from_count(node) / intervals - first) * count;
+            let position = from + (end - from) * share.min(T::one());
+            *track.path.get_mut(node)? = position;
+            node -= 1;
+        }
+        end = from;
+    }
+    *track.path.first_mut()? = field.agent.start;
+    *track.path.get_mut(trajectory.intervals())? = field.agent.goal;
+    // A corner costs steps of the projection; where sensors are sought, it may be at one.
+    if field.scenario.is_avoiding() {
+        smooth(track.path.get_mut(..trajectory.nodes())?);
+    }
+    Some(track)
+}
+
+/// Rounds the corners of a path.
+fn smooth<T: Real, const DIM: usize>(path: &mut [Point<T, DIM>]) {
+    for _ in 0..ROUNDINGS {
+        let Some(mut before) = path.first().copied() else { return };
+        for index in 1..path.len().saturating_sub(1) {
+            let Some([here, after]) = path.get_mut(index..=index + 1) else { continue };
+            let rounded = (before + *after) * T::real(0.25) + *here * T::real(0.5);
+            before = *here;
+            *here = rounded;
+        }
+    }
+}
+
+/// Where a path that visits `cell` passes: its centre, or a sensor in it over which flying is cheaper.
+fn waypoint<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    field: &Field<'_, T, DIM, NODES, AGENTS>,
+    plan: &Plan<T, DIM>,
+    slice: &Slice<T, DIM, AGENTS>,
+    cell: usize,
+    scratch: &mut [Sample<T, DIM>],
+) -> Point<T, DIM> {
+    let center = plan.grid.center_of(cell);
+    let mut best = (field.rate(slice, &center, scratch), center);
+    for sensor in field.scenario.sensors {
+        let place = field.scenario.sensor_state(sensor, slice.time()).0;
+        if plan.grid.cell(&place) == cell && plan.grid.holds(&place) {
+            let rate = field.rate_across(slice, &place, &plan.grid.pitch, scratch);
+            if rate < best.0 {
+                best = (rate, place);
+            }
+        }
+    }
+    best.1
 }
 
 /// A running cost as a landscape holds it; infinite where it is no number.

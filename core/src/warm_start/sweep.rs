@@ -83,7 +83,7 @@ impl<const DIM: usize> Block<DIM> {
     }
 
     /// Its rows along the first coordinate: number of the first cell, and of cells.
-    fn rows(&self, counts: &[usize; DIM]) -> impl Iterator<Item = (usize, usize)> {
+    pub(super) fn rows(&self, counts: &[usize; DIM]) -> impl Iterator<Item = (usize, usize)> {
         let (block, counts) = (*self, *counts);
         let sides = block.low.iter().zip(&block.high).skip(1).map(|(low, high)| high - low + 1);
         let (rows, length) = (sides.product(), block.high.first().zip(block.low.first()));

@@ -86,9 +86,9 @@ fn find_with(
     let mut tables = Box::new(Tables::<1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 32];
-    let variant = Variant { reach, inflation: 1.12, duration, span: duration };
+    let variant = Variant { reach, inflation: 1.12, duration, span: duration, others: None };
     let found = search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch);
-    (path, found)
+    (path, found.map(|routes| routes.cost()))
 }
 
 fn nodes(path: &Path) -> &[Place] {
@@ -264,7 +264,7 @@ fn finds_its_way_in_three_dimensions() {
     let mut tables = Box::new(Tables::<1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 4];
-    let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0, span: 110.0 };
+    let variant = Variant { reach: 4.0, inflation: 1.12, duration: 110.0, span: 110.0, others: None };
     search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch).unwrap();
     // The domain is a sheet: over it is the only way around.
     let highest = path.tracks[0].path[..41].iter().map(|place| place[2]).fold(0.0, f64::max);

@@ -11,7 +11,7 @@
 use super::super::controls::{Bound, Kind};
 use super::super::coordinates::{Frame, Iterate};
 use super::super::feasible::largest_share;
-use super::super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours};
+use super::super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours, race};
 use super::extremes::Extremes;
 use super::newton::{Move, Solved};
 use super::system::EXTREMES;
@@ -42,6 +42,8 @@ const MULTIPLIER_LEFT: f64 = 0.01;
 const MULTIPLIER_RANGE: f64 = 1e8;
 /// Multipliers stay within this factor of mu / g.
 const CENTRAL_RANGE: f64 = 1e4;
+/// Steps after which a candidate may have come to the champion's way.
+const JOIN_AFTER: usize = 2;
 /// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
 const HELD_UP: (f64, usize) = (0.05, 2);
 
@@ -142,6 +144,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 self.barrier = self.lower();
                 continue;
             };
+            let is_joining = ledger.has_rival && step >= JOIN_AFTER;
+            if is_joining && race::has_joined(self.scenario, &workspace.trial, &workspace.champion) {
+                return Followed::To(Status::IterationLimit);
+            }
             short = if share < T::real(HELD_UP.0) { short + 1 } else { 0 };
             if short >= HELD_UP.1 && self.may_be_held_up(workspace.iterate.pace) {
                 let taken = step + 1;
