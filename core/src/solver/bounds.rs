@@ -76,7 +76,8 @@ impl<T: Real> Settings<T> {
             iterations: polished * short.iterations + finished * long.iterations,
             refinements: polished * short.refinements + finished * long.refinements,
             factorizations: polished * short.factorizations + finished * long.factorizations,
-            evaluations: 1 + projected + polished * (short.evaluations + 1) + finished * (long.evaluations + 1),
+            // The start, and a line that waits.
+            evaluations: 2 + projected + polished * (short.evaluations + 1) + finished * (long.evaluations + 1),
             projection_steps: projected * global::PROJECTION_STEPS
                 + polished * short.projection_steps
                 + finished * long.projection_steps,

@@ -45,6 +45,18 @@ fn find_with(
     reduce: Reduce,
     duration: f64,
 ) -> (Path, Found) {
+    let variant = Variant { reach, inflation: 1.12, duration, span: duration, others: None };
+    let (path, found) = search_with((variant, rate), sensors, (regions, limits), reduce);
+    (path, found.map(|routes| routes.cost()))
+}
+
+/// The same for a variant.
+fn search_with(
+    (variant, rate): (Variant<f64>, f64),
+    sensors: &[Sensor<'_, f64, 2>],
+    (regions, limits): (&[Region<f64>], &[Limit<f64>]),
+    reduce: Reduce,
+) -> (Path, Result<Routes<f64, 2>, Obstruction<f64, 2>>) {
     let agent = Agent {
         start: Place::new(1.0, 5.0),
         goal: Place::new(9.0, 5.0),
@@ -80,15 +92,38 @@ fn find_with(
     })
     .unwrap();
     let view = scenario.view();
-    let mut path = Path::straight(&view, duration).unwrap();
+    let mut path = Path::straight(&view, variant.duration).unwrap();
     let mut landscape = Box::new(Landscape::EMPTY);
     landscape.rates.fill(rate as f32);
     let mut tables = Box::new(Tables::<1024, 32768>::EMPTY);
     let lattice = &mut Lattice { landscape: &mut landscape, tables: &mut tables };
     let mut scratch = [Sample::default(); 32];
-    let variant = Variant { reach, inflation: 1.12, duration, span: duration, others: None };
     let found = search(&view, &mut path, 0, (&variant, Prices::default()), lattice, &mut scratch);
-    (path, found.map(|routes| routes.cost()))
+    (path, found)
+}
+
+/// A sweep for many flight times finds for each what a sweep for that one alone finds.
+#[test]
+fn one_sweep_finds_the_ways_of_all_flight_times() {
+    let sensors = wall(2.0, 10.0);
+    let all = Variant { reach: 4.0, inflation: 1.12, duration: 140.0, span: 140.0, others: Some([100.0, 140.0]) };
+    let (_, routes) = search_with((all, 0.0), &sensors, (&[], &[]), Reduce::Integral);
+    let routes = routes.expect("there is a way round");
+    let mut compared = 0;
+    for route in &routes.list {
+        let alone = Variant { duration: routes.plan.duration(route.slices), others: None, ..all };
+        let (path, found) = search_with((alone, 0.0), &sensors, (&[], &[]), Reduce::Integral);
+        let found = found.expect("there is a way round");
+        assert!((path.duration() - alone.duration).abs() < 1e-9);
+        if found.plan.slices == route.slices {
+            assert_eq!(found.list[0].cells, route.cells);
+            assert!((found.cost() - route.cost).abs() < 1e-5 * route.cost, "{} and {}", found.cost(), route.cost);
+            compared += 1;
+        }
+    }
+    assert!(compared >= 3, "{compared} of {}", routes.len());
+    let costs: List<f64> = routes.list.iter().map(|route| route.cost).collect();
+    assert!(costs.is_sorted(), "{costs:?}");
 }
 
 fn nodes(path: &Path) -> &[Place] {
