@@ -121,26 +121,73 @@ pub(super) fn factor<T: Real, const DIM: usize>(rows: &mut [BlockRow<T, DIM>], f
     true
 }
 
-/// Replaces a right-hand side by the solution, with rows that [`factor`] has factored.
-pub(super) fn solve<T: Real, const DIM: usize>(rows: &[BlockRow<T, DIM>], values: &mut [Point<T, DIM>]) {
-    let mut above = Point::<T, DIM>::zeros();
-    let mut above_two = Point::<T, DIM>::zeros();
-    for (row, value) in rows.iter().zip(values.iter_mut()) {
-        let rest = *value - row.one * above - row.two * above_two;
-        *value = forward(&row.here, &rest);
-        (above_two, above) = (above, *value);
+/// Replaces right-hand sides by their solutions, with rows that [`factor`] has factored.
+///
+/// Every node waits for the one before: several sides at once take little longer than one.
+pub(super) fn solve<T: Real, const DIM: usize, const SIDES: usize>(
+    rows: &[BlockRow<T, DIM>],
+    mut sides: [&mut [Point<T, DIM>]; SIDES],
+) {
+    let count = sides.iter().map(|side| side.len()).fold(rows.len(), usize::min);
+    let rows = rows.get(..count).unwrap_or_default();
+    let mut known = [Known::nothing(); SIDES];
+    for (index, row) in rows.iter().enumerate() {
+        for (known, side) in known.iter_mut().zip(&mut sides) {
+            if let Some(value) = side.get_mut(index) {
+                known.forward(row, value);
+            }
+        }
     }
-    // What the two rows below take from this one.
-    let mut pull_one = Point::<T, DIM>::zeros();
-    let mut pull_two = Point::<T, DIM>::zeros();
-    let mut pull_two_next = Point::<T, DIM>::zeros();
-    let used = rows.len().min(values.len());
-    for (row, value) in rows.iter().zip(values.get_mut(..used).unwrap_or_default()).rev() {
-        let rest = *value - pull_one - pull_two;
+    let mut pulls = [Pulls::nothing(); SIDES];
+    for (index, row) in rows.iter().enumerate().rev() {
+        for (pulls, side) in pulls.iter_mut().zip(&mut sides) {
+            if let Some(value) = side.get_mut(index) {
+                pulls.backward(row, value);
+            }
+        }
+    }
+}
+
+/// What the two rows above came out as.
+#[derive(Clone, Copy)]
+struct Known<T, const DIM: usize> {
+    one: Point<T, DIM>,
+    two: Point<T, DIM>,
+}
+
+impl<T: Real, const DIM: usize> Known<T, DIM> {
+    fn nothing() -> Self {
+        Self { one: Point::zeros(), two: Point::zeros() }
+    }
+
+    #[inline(always)]
+    fn forward(&mut self, row: &BlockRow<T, DIM>, value: &mut Point<T, DIM>) {
+        let rest = *value - row.one * self.one - row.two * self.two;
+        *value = forward(&row.here, &rest);
+        (self.two, self.one) = (self.one, *value);
+    }
+}
+
+/// What the two rows below take from this one, and from the next.
+#[derive(Clone, Copy)]
+struct Pulls<T, const DIM: usize> {
+    one: Point<T, DIM>,
+    two: Point<T, DIM>,
+    two_next: Point<T, DIM>,
+}
+
+impl<T: Real, const DIM: usize> Pulls<T, DIM> {
+    fn nothing() -> Self {
+        Self { one: Point::zeros(), two: Point::zeros(), two_next: Point::zeros() }
+    }
+
+    #[inline(always)]
+    fn backward(&mut self, row: &BlockRow<T, DIM>, value: &mut Point<T, DIM>) {
+        let rest = *value - self.one - self.two;
         *value = backward(&row.here, &rest);
-        pull_one = row.one.transpose() * *value;
-        pull_two = pull_two_next;
-        pull_two_next = row.two.transpose() * *value;
+        self.one = row.one.transpose() * *value;
+        self.two = self.two_next;
+        self.two_next = row.two.transpose() * *value;
     }
 }
 
@@ -183,7 +230,9 @@ mod tests {
             let mut values = product(&matrix, &x);
             let mut factored = matrix.clone();
             assert!(factor(&mut factored, 0.0));
-            solve(&factored, &mut values);
+            let mut again = values.clone();
+            solve(&factored, [&mut values, &mut again]);
+            assert_eq!(values, again);
             for (value, expected) in values.iter().zip(&x) {
                 assert!(
                     (value - expected).iter().all(|error| error.abs() < 1e-12),

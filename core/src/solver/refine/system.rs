@@ -268,14 +268,18 @@ impl<T: Real, const DIM: usize, const NODES: usize> System<T, DIM, NODES> {
         let Self { factored, local, columns, solved, right, centre, pull, step, used, controls, intervals, .. } =
             self;
         let matrix = Matrix { factored, local, controls: *controls, intervals: *intervals };
-        for ((solved, column), _) in solved.iter_mut().zip(columns).zip(used).filter(|(_, used)| **used) {
-            solved.assign(column, matrix.intervals);
-            matrix.solve(solved);
-        }
+        let mut columns = solved.iter_mut().zip(columns).zip(used).filter(|(_, used)| **used);
         step.assign(right, matrix.intervals);
-        matrix.solve(step);
         pull.assign(centre, matrix.intervals);
-        matrix.solve(pull);
+        // The pace has a column always.
+        if let Some(((pace, column), _)) = columns.next() {
+            pace.assign(column, matrix.intervals);
+            matrix.solve([step, pull, pace]);
+        }
+        for ((solved, column), _) in columns {
+            solved.assign(column, matrix.intervals);
+            matrix.solve([solved]);
+        }
     }
 
     /// Adds `barrier` times the step towards the centre to the step.
@@ -412,33 +416,47 @@ struct Matrix<'a, T, const DIM: usize> {
 
 impl<T: Real, const DIM: usize> Matrix<'_, T, DIM> {
     /// Controls are eliminated into the path, the path is solved, and the controls follow from it.
-    fn solve<const NODES: usize>(&self, part: &mut Part<T, DIM, NODES>) {
+    fn solve<const NODES: usize, const SIDES: usize>(&self, mut parts: [&mut Part<T, DIM, NODES>; SIDES]) {
+        let interior = self.intervals.saturating_sub(1);
+        if self.controls == Controls::Some {
+            parts.iter_mut().for_each(|part| self.eliminate(part));
+        }
+        block::solve(self.factored, parts.each_mut().map(|part| part.path.get_mut(..interior).unwrap_or_default()));
+        if self.controls == Controls::Some {
+            parts.iter_mut().for_each(|part| self.follow(part));
+        }
+    }
+
+    /// Takes what the controls bring from the path.
+    fn eliminate<const NODES: usize>(&self, part: &mut Part<T, DIM, NODES>) {
         let interior = self.intervals.saturating_sub(1);
         let Part { path, control } = part;
         let path = path.get_mut(..interior).unwrap_or_default();
-        if self.controls == Controls::Some {
-            for (index, (local, values)) in self.local.iter().zip(control.iter()).enumerate().take(self.intervals) {
-                for (kind, value) in local.solve(*values).into_iter().enumerate() {
-                    if let Some(node) = path.get_mut(index) {
-                        *node -= local.here[kind] * value;
-                    }
-                    if let Some(node) = index.checked_sub(1).and_then(|before| path.get_mut(before)) {
-                        *node -= local.before[kind] * value;
-                    }
+        for (index, (local, values)) in self.local.iter().zip(control.iter()).enumerate().take(self.intervals) {
+            for (kind, value) in local.solve(*values).into_iter().enumerate() {
+                if let Some(node) = path.get_mut(index) {
+                    *node -= local.here[kind] * value;
+                }
+                if let Some(node) = index.checked_sub(1).and_then(|before| path.get_mut(before)) {
+                    *node -= local.before[kind] * value;
                 }
             }
         }
-        block::solve(self.factored, path);
-        if self.controls == Controls::Some {
-            let zero = Point::<T, DIM>::zeros();
-            for (index, (local, values)) in self.local.iter().zip(control).enumerate().take(self.intervals) {
-                let here = path.get(index).copied().unwrap_or(zero);
-                let before = index.checked_sub(1).and_then(|before| path.get(before)).copied().unwrap_or(zero);
-                for (kind, value) in values.iter_mut().enumerate() {
-                    *value -= local.here[kind].dot(&here) + local.before[kind].dot(&before);
-                }
-                *values = local.solve(*values);
+    }
+
+    /// The controls that follow from the path.
+    fn follow<const NODES: usize>(&self, part: &mut Part<T, DIM, NODES>) {
+        let interior = self.intervals.saturating_sub(1);
+        let Part { path, control } = part;
+        let path = path.get(..interior).unwrap_or_default();
+        let zero = Point::<T, DIM>::zeros();
+        for (index, (local, values)) in self.local.iter().zip(control).enumerate().take(self.intervals) {
+            let here = path.get(index).copied().unwrap_or(zero);
+            let before = index.checked_sub(1).and_then(|before| path.get(before)).copied().unwrap_or(zero);
+            for (kind, value) in values.iter_mut().enumerate() {
+                *value -= local.here[kind].dot(&here) + local.before[kind].dot(&before);
             }
+            *values = local.solve(*values);
         }
     }
 }
