@@ -42,6 +42,8 @@ const MULTIPLIER_LEFT: f64 = 0.01;
 const MULTIPLIER_RANGE: f64 = 1e8;
 /// Multipliers stay within this factor of mu / g.
 const CENTRAL_RANGE: f64 = 1e4;
+/// Steps in a row that gain no more than rounding, after which the barrier parameter falls, whatever they predict.
+const SPENT: usize = 2;
 /// Steps after which a candidate may have come to the champion's way.
 const JOIN_AFTER: usize = 2;
 /// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
@@ -58,6 +60,8 @@ pub(super) struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     pub(super) is_guarded: bool,
     /// Whether the systems hold what the nodes of the iterate bring, bounds aside.
     pub(super) is_laid: bool,
+    /// Whether the last step gained no more than rounding.
+    pub(super) is_spent: bool,
     /// Of the integral terms and the penalty, at the iterate.
     pub(super) objective: T,
     /// Sum of -ln g over all slacks, at the iterate.
@@ -125,7 +129,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         self.weigh(workspace);
         ledger.evaluations += 1;
         let (known, first) = (ledger.best, self.barrier);
-        let mut short = 0;
+        let (mut short, mut spent) = (0, 0);
         for step in 0..steps + ledger.patience {
             if step >= steps && ledger.best < known && self.barrier < first {
                 break;
@@ -144,6 +148,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 self.barrier = self.lower();
                 continue;
             };
+            spent = if self.is_spent { spent + 1 } else { 0 };
+            if spent >= SPENT && self.barrier > self.barrier_last {
+                (spent, self.barrier) = (0, self.lower());
+            }
             let is_joining = ledger.has_rival && step >= JOIN_AFTER;
             if is_joining && race::has_joined(self.scenario, &workspace.trial, &workspace.champion) {
                 return Followed::To(Status::IterationLimit);
@@ -389,6 +397,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             let value = self.merit(objective, &extremes, logs);
             if value.finite() && value <= merit + T::real(SUFFICIENT) * share * step.slope + rounding {
                 (self.objective, self.logs, self.is_laid) = (objective, logs, is_laid);
+                self.is_spent = merit - value <= rounding;
                 self.keep_if_best(workspace, ledger);
                 self.move_multipliers(share, workspace);
                 self.range = T::real(CENTRAL_RANGE);

@@ -112,6 +112,7 @@ where
         extremes,
         is_guarded: guard::is_needed(scenario),
         is_laid: false,
+        is_spent: false,
         objective: T::zero(),
         logs: T::zero(),
         barrier: if is_inside { ledger.barrier.min(first) } else { first },
