@@ -310,12 +310,18 @@ impl<T: Real, const DIM: usize> Routes<T, DIM> {
 
     /// Keeps what is among the cheapest.
     fn enter(&mut self, new: Route<T>) {
-        let place = self.list.iter().position(|known| new.cost < known.cost).unwrap_or(self.list.len());
-        if self.list.is_full() && place < self.list.len() {
+        if self.list.is_full() && self.list.last().is_some_and(|last| new.cost < last.cost) {
             self.list.pop();
         }
         // What is dearer than all of a full list has no place.
-        let _ = self.list.insert(place, new);
+        let _ = self.list.push(new);
+        let mut after: Option<&mut Route<T>> = None;
+        for here in self.list.iter_mut().rev() {
+            if let Some(after) = after.filter(|after| after.cost < here.cost) {
+                core::mem::swap(after, here);
+            }
+            after = Some(here);
+        }
     }
 }
 
