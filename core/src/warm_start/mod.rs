@@ -56,9 +56,9 @@ pub const VARIANTS_MAX: usize = 8;
 const INFLATION_MAX: f64 = 1.25;
 /// Fewest and most slices of a flight.
 const SLICES_MIN: usize = 2;
-const SLICES_MAX: usize = 72;
+const SLICES_MAX: usize = if cfg!(feature = "compact") { 32 } else { 72 };
 /// Flight times of one sweep that are kept, those of the cheapest ways.
-pub(crate) const ROUTES_MAX: usize = 8;
+pub(crate) const ROUTES_MAX: usize = if cfg!(feature = "compact") { 2 } else { 8 };
 /// Largest running cost of a cell: sums of them are finite in single precision.
 const RATE_MAX: f64 = 1e30;
 /// Times that the corners of a path are rounded, each over one node to either side.

@@ -152,7 +152,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             if spent >= SPENT && self.barrier > self.barrier_last {
                 (spent, self.barrier) = (0, self.lower());
             }
-            let is_joining = ledger.has_rival && step >= JOIN_AFTER;
+            let is_joining = ledger.has_rival && step >= JOIN_AFTER && !cfg!(feature = "compact");
             if is_joining && race::has_joined(self.scenario, &workspace.trial, &workspace.champion) {
                 return Followed::To(Status::IterationLimit);
             }
