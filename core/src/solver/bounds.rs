@@ -41,7 +41,8 @@ impl<T: Real> Settings<T> {
     #[must_use]
     pub const fn bounds_near(&self) -> Bounds {
         let improved = self.improvement(self.iterations, self.refinements);
-        Bounds { evaluations: improved.evaluations + 1, ..improved }
+        // The start, and the plan as it is reported.
+        Bounds { evaluations: improved.evaluations + 2, ..improved }
     }
 
     /// The most that a plan from [`super::Start::Global`] for a number of agents takes.
@@ -76,8 +77,8 @@ impl<T: Real> Settings<T> {
             iterations: polished * short.iterations + finished * long.iterations,
             refinements: polished * short.refinements + finished * long.refinements,
             factorizations: polished * short.factorizations + finished * long.factorizations,
-            // The start, and a line that waits.
-            evaluations: 2 + projected + polished * (short.evaluations + 1) + finished * (long.evaluations + 1),
+            // The start, a line that waits, and the plan as it is reported.
+            evaluations: 3 + projected + polished * (short.evaluations + 1) + finished * (long.evaluations + 1),
             projection_steps: projected * global::PROJECTION_STEPS
                 + polished * short.projection_steps
                 + finished * long.projection_steps,

@@ -68,7 +68,7 @@ where
     hurried.truncate(settings.variants.max(1));
     // A line that is clear waits for ways that are laid: where one of them passes everything on the same sides, it is better.
     let is_clear = guard::smallest_slack(scenario, &workspace.best, &mut workspace.scratch) > T::zero();
-    let line_waits = is_clear && race.is_avoiding && hurried.iter().all(|variant| variant.others.is_some());
+    let line_waits = is_clear && hurried.iter().all(|variant| variant.others.is_some());
     if !line_waits {
         race.run(workspace, ledger, deadline);
     }
@@ -146,9 +146,9 @@ fn race_routes<T, const DIM: usize, const NODES: usize, const SENSORS: usize, co
             routes.lay(number, scenario, trial, (0, alone), scratch);
         }
         let sides = Sides::of(scenario, &workspace.trial);
-        // Where none has come clear yet, another flight time of the same way may.
+        // More than one way there is only where sides tell them apart; where none has come clear yet, another flight time may.
         let is_open = race.found.status != Status::Infeasible;
-        if race.is_avoiding && is_open && seen.contains(&sides) {
+        if is_open && seen.contains(&sides) {
             continue;
         }
         let _ = seen.push(sides);

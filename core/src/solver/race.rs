@@ -89,8 +89,6 @@ pub(super) struct Race<'a, T, const DIM: usize> {
     ways: Ways,
     /// Least objective of all that were laid, before they were polished.
     promise: T,
-    /// Whether sides tell ways apart: see [`View::is_avoiding`].
-    pub(super) is_avoiding: bool,
     /// On which sides of things all passed that were polished, before and after, with the least objective as they were laid.
     known: Vec<(Sides, T), KNOWN_MAX>,
     /// Lattice paths polished.
@@ -112,7 +110,6 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
             second: none,
             ways: Ways::All,
             promise: T::INFINITY,
-            is_avoiding: scenario.is_avoiding(),
             known: Vec::new(),
             polished: 0,
             idle: 0,
@@ -146,7 +143,8 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         workspace: &Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ) -> bool {
         let sides = Sides::of(self.scenario, &workspace.trial);
-        let is_better = |laid: T| if self.is_avoiding { objective < laid } else { objective != laid };
+        let is_avoiding = self.scenario.is_avoiding();
+        let is_better = |laid: T| if is_avoiding { objective < laid } else { objective != laid };
         self.known.iter().all(|&(known, laid)| known != sides || is_better(laid))
     }
 
