@@ -265,3 +265,18 @@ pub fn power<T: Real>(base: T, exponent: T) -> T {
     };
     if exponent < T::zero() { T::one() / power } else { power }
 }
+/// Enters a value into a list that holds those of least rank in order; where it is full, the one of greatest rank goes.
+pub(crate) fn keep_least<T: Real, V, const N: usize>(list: &mut heapless::Vec<V, N>, new: V, rank: impl Fn(&V) -> T) {
+    if list.is_full() && list.last().is_some_and(|last| rank(&new) < rank(last)) {
+        list.pop();
+    }
+    // What ranks above all of a full list has no place.
+    let _ = list.push(new);
+    let mut after: Option<&mut V> = None;
+    for here in list.iter_mut().rev() {
+        if let Some(after) = after.filter(|after| rank(after) < rank(here)) {
+            core::mem::swap(after, here);
+        }
+        after = Some(here);
+    }
+}

@@ -15,7 +15,7 @@
 use heapless::Vec;
 
 use crate::constraints::region::horizontal;
-use crate::math::{Point, Real, norm};
+use crate::math::{Point, Real, keep_least, norm};
 use crate::scenario::{View, Window};
 use crate::trajectory::Trajectory;
 
@@ -60,26 +60,11 @@ pub(super) fn passed<T: Real, const DIM: usize, const NODES: usize, const AGENTS
             let Some(found) = nearest(scenario, trajectory, agent, by) else { continue };
             let room = norm(&found.offset) - found.radius;
             if room < near {
-                enter(&mut all, Passed { agent, by, room });
+                keep_least(&mut all, Passed { agent, by, room }, |passed| passed.room);
             }
         }
     }
     all
-}
-
-/// Keeps what is among the nearest.
-fn enter<T: Real>(all: &mut Vec<Passed<T>, SIDES_MAX>, new: Passed<T>) {
-    if all.is_full() && all.last().is_some_and(|last| new.room < last.room) {
-        all.pop();
-    }
-    let _ = all.push(new);
-    let mut before: Option<&mut Passed<T>> = None;
-    for here in all.iter_mut().rev() {
-        if let Some(last) = before.filter(|last| last.room < here.room) {
-            core::mem::swap(last, here);
-        }
-        before = Some(here);
-    }
 }
 
 /// Where a path is nearest to something.
@@ -203,9 +188,9 @@ mod tests {
 
     #[test]
     fn the_nearest_are_kept_in_order() {
-        let mut all = Vec::new();
+        let mut all = Vec::<_, SIDES_MAX>::new();
         for room in [5.0, 1.0, 4.0, 2.0, 9.0, 3.0, 0.5, 8.0] {
-            enter(&mut all, Passed { agent: 0, by: By::Sensor(0), room });
+            keep_least(&mut all, Passed { agent: 0, by: By::Sensor(0), room }, |passed| passed.room);
         }
         let rooms: std::vec::Vec<f64> = all.iter().map(|passed| passed.room).collect();
         assert_eq!(rooms, [0.5, 1.0, 2.0, 3.0, 4.0, 5.0]);

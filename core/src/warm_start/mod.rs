@@ -32,37 +32,31 @@ mod equipment;
 mod field;
 mod grid;
 mod obstruction;
+mod routes;
 mod sweep;
 
 use heapless::Vec;
 
 use crate::math::{Point, Real, norm};
 use crate::metrics::Sample;
-use crate::scenario::{Agent, Domain, Reduce, View};
+use crate::scenario::{Agent, Reduce, View};
 use crate::trajectory::Trajectory;
 
 use field::{Field, SHARPNESS, Slice, Weights};
-use grid::{Grid, Moves};
+use grid::Moves;
 use obstruction::{first_blocked, first_crossed};
+use routes::{Plan, Route, SLICES_MAX, SLICES_MIN};
 use sweep::{Block, Sweep};
 
 pub(crate) use equipment::{Level, Prices, azimuth_of_nearest, equip, equip_elsewhere};
 pub(crate) use field::LARGE_TEAM;
 pub use obstruction::{Blocked, Obstruction};
+pub(crate) use routes::{ROUTES_MAX, Routes};
 
 /// Variants that [`variants`] lists at most.
 pub const VARIANTS_MAX: usize = 8;
-/// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
-const INFLATION_MAX: f64 = 1.25;
-/// Fewest and most slices of a flight.
-const SLICES_MIN: usize = 2;
-const SLICES_MAX: usize = if cfg!(feature = "compact") { 32 } else { 72 };
-/// Flight times of one sweep that are kept, those of the cheapest ways.
-pub(crate) const ROUTES_MAX: usize = if cfg!(feature = "compact") { 2 } else { 8 };
 /// Largest running cost of a cell: sums of them are finite in single precision.
 const RATE_MAX: f64 = 1e30;
-/// Times that the corners of a path are rounded, each over one node to either side.
-const ROUNDINGS: usize = 2;
 /// Cost of a free cell, relative to that of a blocked one, where the question is what blocks the way.
 const FREE: f64 = 1e-3;
 
@@ -79,23 +73,6 @@ pub struct Variant<T> {
     pub span: T,
     /// The shortest and the longest of other flight times that the sweep looks at too, s; `None` where costs depend on it.
     pub others: Option<[T; 2]>,
-}
-
-/// Ways of one sweep, the cheapest first.
-#[derive(Clone, Debug)]
-pub(crate) struct Routes<T, const DIM: usize> {
-    plan: Plan<T, DIM>,
-    list: Vec<Route<T>, ROUTES_MAX>,
-}
-
-/// The cheapest way of so many slices.
-#[derive(Clone, Debug)]
-struct Route<T> {
-    /// Penalty on late arrival included.
-    cost: T,
-    slices: usize,
-    /// Where it is after every slice but the last, the last of them first.
-    cells: Vec<u16, SLICES_MAX>,
 }
 
 /// How blocked cells are told from free ones.
@@ -142,24 +119,6 @@ struct Survey<T> {
     grid: [[T; 3]; 2],
     equipment: [T; 4],
     weights: Weights<T>,
-}
-
-/// Grid, slices and reach of one search.
-#[derive(Clone, Copy, Debug)]
-struct Plan<T, const DIM: usize> {
-    grid: Grid<T, DIM>,
-    /// Slices of the longest flight time.
-    slices: usize,
-    /// Slices of the shortest.
-    fewest: usize,
-    /// Distance that one slice reaches, length units.
-    reach: T,
-    /// Length of a slice, s.
-    interval: T,
-    /// The longest flight time, s.
-    longest: T,
-    /// Longest way that any variant on this grid goes, length units.
-    farthest: T,
 }
 
 /// A few searches that differ in what a lattice gets wrong, and in flight time where that is free.
@@ -278,53 +237,6 @@ where
     }
 }
 
-impl<T: Real, const DIM: usize> Routes<T, DIM> {
-    /// How many there are.
-    pub(crate) fn len(&self) -> usize {
-        self.list.len()
-    }
-
-    /// Estimated cost of the cheapest, the penalty on late arrival included.
-    #[cfg(test)]
-    pub(crate) fn cost(&self) -> T {
-        self.list.first().map_or(T::INFINITY, |route| route.cost)
-    }
-
-    /// Writes one of them, counted from the cheapest, at equal times to the track of `agent`, with its flight time.
-    pub(crate) fn lay<const NODES: usize, const AGENTS: usize>(
-        &self,
-        number: usize,
-        scenario: &View<'_, T, DIM>,
-        trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
-        (agent, prices): (usize, Prices<T>),
-        scratch: &mut [Sample<T, DIM>],
-    ) {
-        let Some(route) = self.list.get(number) else { return };
-        trajectory.set_duration(scenario.frame.start_time, self.plan.duration(route.slices));
-        let Some(field) = Field::new(scenario, trajectory, agent, prices, 0, scratch) else { return };
-        let track = trace(&field.of_lattice(), &self.plan, route, trajectory, scratch);
-        if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
-            *slot = track;
-        }
-    }
-
-    /// Keeps what is among the cheapest.
-    fn enter(&mut self, new: Route<T>) {
-        if self.list.is_full() && self.list.last().is_some_and(|last| new.cost < last.cost) {
-            self.list.pop();
-        }
-        // What is dearer than all of a full list has no place.
-        let _ = self.list.push(new);
-        let mut after: Option<&mut Route<T>> = None;
-        for here in self.list.iter_mut().rev() {
-            if let Some(after) = after.filter(|after| after.cost < here.cost) {
-                core::mem::swap(after, here);
-            }
-            after = Some(here);
-        }
-    }
-}
-
 impl<T: Real> Survey<T> {
     /// All zeros, as all memory is before it is used: then it takes no room in an image.
     const NOTHING: Self = Self {
@@ -388,7 +300,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         let count = T::from_count(plan.slices);
         let (start, goal) = (&field.agent.start, &field.agent.goal);
         let farthest = self.tables.moves.farthest();
-        let mut routes = Routes { plan: *plan, list: Vec::new() };
+        let mut routes = Routes::of(plan);
         let mut alive = plan.grid.around(start, T::zero())?;
         for number in 1..=plan.slices {
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
@@ -583,117 +495,6 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         }
         sum / T::from_count(count)
     }
-}
-
-impl<T: Real, const DIM: usize> Plan<T, DIM> {
-    /// Lays the grid, and cuts the flight into slices that reach about the variant's number of cells.
-    fn new(
-        domain: &Domain<T, DIM>,
-        agent: &Agent<T, DIM>,
-        variant: &Variant<T>,
-        (cells_max, parents_max): (usize, usize),
-    ) -> Self {
-        let way = agent.speed_max * variant.duration * variant.inflation;
-        let farthest =
-            agent.speed_max * variant.span.max(variant.duration) * T::real(INFLATION_MAX).max(variant.inflation);
-        let mut cells = cells_max;
-        loop {
-            let grid = Grid::new(domain, (&agent.start, &agent.goal), farthest, cells);
-            // Never less than the variant's reach: a lattice that falls a little short of a whole cell loses it.
-            let count = T::from_count(slices(way / (grid.size() * variant.reach.max(T::one()))));
-            let interval = variant.duration / count;
-            let [shortest, longest] = variant.others.unwrap_or([variant.duration; 2]);
-            // A flight time that is a whole number of slices is one more or less where it is rounded.
-            let [most, fewest] = [(longest, 1e-3), (shortest, 1.0 - 1e-3)]
-                .map(|(duration, part)| slices(duration / interval + T::real(part)));
-            if grid.cells() * (most - SLICES_MIN) <= parents_max || cells <= 1 {
-                let fewest = fewest.min(most);
-                return Self { grid, slices: most, fewest, reach: way / count, interval, longest, farthest };
-            }
-            cells -= (cells / 16).max(1);
-        }
-    }
-
-    /// Flight time of so many slices, s.
-    fn duration(&self, slices: usize) -> T {
-        (self.interval * T::from_count(slices)).min(self.longest)
-    }
-}
-
-/// As many slices as there are whole ones, but some.
-fn slices<T: Real>(wanted: T) -> usize {
-    (SLICES_MIN..SLICES_MAX).take_while(|&slices| T::from_count(slices + 1) <= wanted).count() + SLICES_MIN
-}
-
-/// A route at the trajectory's nodes.
-fn trace<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
-    field: &Field<'_, T, DIM, NODES, AGENTS>,
-    plan: &Plan<T, DIM>,
-    route: &Route<T>,
-    trajectory: &Trajectory<T, DIM, NODES, AGENTS>,
-    scratch: &mut [Sample<T, DIM>],
-) -> Option<crate::trajectory::Track<T, DIM, NODES>> {
-    let mut track = *trajectory.tracks.get(field.index)?;
-    let intervals = T::from_count(trajectory.intervals().max(1));
-    let count = T::from_count(route.slices);
-    let mut end = field.agent.goal;
-    let mut node = trajectory.intervals();
-    // Cells lie between slices; before the first is the start.
-    let cells = route.cells.iter().map(|&cell| Some(usize::from(cell))).chain([None]);
-    for (number, cell) in (1..=route.slices).rev().zip(cells) {
-        let first = T::from_count(number - 1) / count;
-        let slice = field.slice(first, T::from_count(number) / count);
-        let from = cell.map_or(field.agent.start, |cell| waypoint(field, plan, &slice, cell, scratch));
-        while node > 0 && T::from_count(node) / intervals > first {
-            let share = (T::from_count(node) / intervals - first) * count;
-            let position = from + (end - from) * share.min(T::one());
-            *track.path.get_mut(node)? = position;
-            node -= 1;
-        }
-        end = from;
-    }
-    *track.path.first_mut()? = field.agent.start;
-    *track.path.get_mut(trajectory.intervals())? = field.agent.goal;
-    // A corner costs steps of the projection; where sensors are sought, it may be at one.
-    if field.scenario.is_avoiding() {
-        smooth(track.path.get_mut(..trajectory.nodes())?);
-    }
-    Some(track)
-}
-
-/// Rounds the corners of a path.
-fn smooth<T: Real, const DIM: usize>(path: &mut [Point<T, DIM>]) {
-    for _ in 0..ROUNDINGS {
-        let Some(mut before) = path.first().copied() else { return };
-        for index in 1..path.len().saturating_sub(1) {
-            let Some([here, after]) = path.get_mut(index..=index + 1) else { continue };
-            let rounded = (before + *after) * T::real(0.25) + *here * T::real(0.5);
-            before = *here;
-            *here = rounded;
-        }
-    }
-}
-
-/// Where a path that visits `cell` passes: its centre, or a sensor in it over which flying is cheaper.
-fn waypoint<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
-    field: &Field<'_, T, DIM, NODES, AGENTS>,
-    plan: &Plan<T, DIM>,
-    slice: &Slice<T, DIM, AGENTS>,
-    cell: usize,
-    scratch: &mut [Sample<T, DIM>],
-) -> Point<T, DIM> {
-    let center = plan.grid.center_of(cell);
-    let mut best = (field.rate(slice, &center, scratch), center);
-    for sensor in field.scenario.sensors {
-        let place = field.scenario.sensor_state(sensor, slice.time()).0;
-        if plan.grid.cell(&place) == cell && plan.grid.holds(&place) {
-            let rate = field.rate_across(slice, &place, &plan.grid.pitch, scratch);
-            if rate < best.0 {
-                best = (rate, place);
-            }
-        }
-    }
-    best.1
 }
 
 /// A running cost as a landscape holds it; infinite where it is no number.
