@@ -143,7 +143,7 @@ fn race_routes<T, const DIM: usize, const NODES: usize, const SENSORS: usize, co
             let alone = prices.first().copied().unwrap_or_default();
             let Workspace { base, trial, scratch, .. } = &mut *workspace;
             trial.assign(base);
-            routes.lay(number, scenario, trial, (0, alone), scratch);
+            routes.lay(number, scenario, trial, (0, alone, 0), scratch);
         }
         let sides = Sides::of(scenario, &workspace.trial);
         // More than one way there is only where sides tell them apart; where none has come clear yet, another flight time may.

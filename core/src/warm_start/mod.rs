@@ -284,7 +284,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         self.tables.moves.collect(&plan.grid, plan.reach);
         let routes = self.sweep(&field, plan, caution, scratch)?;
         (routes.len() > 0).then_some(())?;
-        routes.lay(0, scenario, trajectory, (agent, prices), scratch);
+        routes.lay(0, scenario, trajectory, (agent, prices, pass), scratch);
         Some(routes)
     }
 

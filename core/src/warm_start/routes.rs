@@ -77,18 +77,18 @@ impl<T: Real, const DIM: usize> Routes<T, DIM> {
         self.list.first().map_or(T::INFINITY, |route| route.cost)
     }
 
-    /// Writes one of them, counted from the cheapest, at equal times to the track of `agent`, with its flight time.
+    /// Writes one of them, counted from the cheapest, at equal times to the track of `agent`, with its flight time; after `pass`, as the field counts them.
     pub(crate) fn lay<const NODES: usize, const AGENTS: usize>(
         &self,
         number: usize,
         scenario: &View<'_, T, DIM>,
         trajectory: &mut Trajectory<T, DIM, NODES, AGENTS>,
-        (agent, prices): (usize, Prices<T>),
+        (agent, prices, pass): (usize, Prices<T>, usize),
         scratch: &mut [Sample<T, DIM>],
     ) {
         let Some(route) = self.list.get(number) else { return };
         trajectory.set_duration(scenario.frame.start_time, self.plan.duration(route.slices));
-        let Some(field) = Field::new(scenario, trajectory, agent, prices, 0, scratch) else { return };
+        let Some(field) = Field::new(scenario, trajectory, agent, prices, pass, scratch) else { return };
         let track = trace(&field.of_lattice(), &self.plan, route, trajectory, scratch);
         if let (Some(slot), Some(track)) = (trajectory.tracks.get_mut(agent), track) {
             *slot = track;
