@@ -7,7 +7,8 @@
 //! the point that a gradient step in the metric reaches once projected. Steps (D1 y), bends (D2 e) and positions
 //! each have a copy that is projected on its ball or box alone; one banded system and one scalar equation pull the
 //! copies together. The matrix depends on the number of nodes only, so it is factored once a plan. Multipliers are
-//! kept between calls: late in a plan a handful of steps is enough.
+//! kept between calls: late in a plan a handful of steps is enough. Positions have copies from when one has come to a wall of
+//! the domain on: before, copies that nothing holds would only hold them where they were.
 //!
 //! The result keeps the bounds to about `tolerance`; bounds are drawn in by a margin for that reason, and
 //! [`super::feasible`] makes what is left exact.
@@ -62,18 +63,9 @@ impl<T: Real, const DIM: usize> Copied<T, DIM> {
     }
 
     /// The same for a box.
-    fn hold_in_box(
-        &mut self,
-        value: &Point<T, DIM>,
-        low: &Point<T, DIM>,
-        high: &Point<T, DIM>,
-        residual: &mut Residual<T>,
-    ) {
+    fn hold_in_box(&mut self, value: &Point<T, DIM>, [low, high]: &[Point<T, DIM>; 2], residual: &mut Residual<T>) {
         let wanted = self.relaxed(value);
-        let mut inside = wanted;
-        for ((component, &low), &high) in inside.iter_mut().zip(low.iter()).zip(high.iter()) {
-            *component = component.clamp_to(low, high);
-        }
+        let inside = held_in_box(&wanted, low, high);
         self.settle(value, &wanted, inside, residual);
     }
 
@@ -143,6 +135,8 @@ pub(super) struct Projection<T, const DIM: usize, const NODES: usize, const AGEN
     penalty: T,
     /// Step of the last call, to which the multipliers belong.
     last_step: T,
+    /// Whether a position has come to a wall of the domain.
+    met_wall: bool,
 }
 
 /// What one call needs besides the iterate.
@@ -167,12 +161,14 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
             factor: [Factor::empty(), Factor::empty()],
             penalty: T::ZERO,
             last_step: T::ZERO,
+            met_wall: false,
         }
     }
 
     /// Takes the scenario's grid and forgets all multipliers.
     pub(super) fn prepare(&mut self, frame: &Frame<T, DIM, AGENTS>) {
         self.penalty = T::one();
+        self.met_wall = false;
         self.factor(frame);
         self.last_step = T::zero();
         self.forget(frame);
@@ -191,8 +187,16 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
         }
     }
 
+    /// Whether positions have copies; where code is to be small, always.
+    fn has_places(&self) -> bool {
+        cfg!(feature = "compact") || self.met_wall
+    }
+
     /// The slowest mode of D1'D1 has the eigenvalue (pi / N)^2; position copies answer on a softer scale.
     fn place_penalty(&self, frame: &Frame<T, DIM, AGENTS>) -> T {
+        if !self.has_places() {
+            return T::zero();
+        }
         self.penalty * T::real(PLACE_PENALTY) / T::from_count(frame.intervals.max(1))
     }
 
@@ -251,6 +255,10 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
             if step % CHECK_EVERY != 0 {
                 continue;
             }
+            if !self.has_places() && is_outside(request, result) {
+                self.wall(request, result);
+                continue;
+            }
             let residual = squared.roots();
             let dual = residual.moved * self.penalty / (T::one() + residual.multiplier * self.penalty);
             if residual.primal.max(dual) <= request.tolerance {
@@ -263,6 +271,19 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
         }
         settle_budgets(request.frame, result);
         request.steps_max
+    }
+
+    /// Gives positions copies, inside the walls.
+    fn wall(&mut self, request: &Request<'_, T, DIM, AGENTS>, result: &Iterate<T, DIM, NODES, AGENTS>) {
+        let frame = request.frame;
+        self.met_wall = true;
+        self.factor(frame);
+        for ((copies, offsets), agent) in self.copies.iter_mut().zip(result.interior(frame)).zip(frame.agent()) {
+            for (node, (place, offset)) in copies.place.iter_mut().zip(offsets).enumerate() {
+                let [low, high] = walls(request, agent, node, result.pace);
+                *place = Copied { inside: held_in_box(offset, &low, &high), multiplier: Point::zeros() };
+            }
+        }
     }
 
     /// Multipliers are proportional to the step that they resist.
@@ -383,9 +404,12 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Project
     ) -> Residual<T> {
         let frame = request.frame;
         let mut residual = Residual::default();
+        let has_places = self.has_places();
         for ((copies, offsets), agent) in self.copies.iter_mut().zip(result.interior(frame)).zip(frame.agent()) {
             push_steps(request, copies, offsets, (center, result.pace), agent, &mut residual);
-            push_places(request, copies, offsets, result.pace, agent, &mut residual);
+            if has_places {
+                push_places(request, copies, offsets, result.pace, agent, &mut residual);
+            }
         }
         residual
     }
@@ -478,14 +502,49 @@ fn push_places<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usiz
     agent: &AgentFrame<T, DIM>,
     residual: &mut Residual<T>,
 ) {
+    for (node, (place, offset)) in copies.place.iter_mut().zip(offsets).enumerate() {
+        place.hold_in_box(offset, &walls(request, agent, node, pace), residual);
+    }
+}
+
+/// The lowest and the highest offset of an interior node.
+#[inline(always)]
+fn walls<T: Real, const DIM: usize, const AGENTS: usize>(
+    request: &Request<'_, T, DIM, AGENTS>,
+    agent: &AgentFrame<T, DIM>,
+    node: usize,
+    pace: T,
+) -> [Point<T, DIM>; 2] {
     let count = T::from_count(request.frame.intervals.max(1));
     let scale = pace / agent.stride;
-    for (node, (place, offset)) in copies.place.iter_mut().zip(offsets).enumerate() {
-        let line = agent.start + agent.line * (T::from_count(node + 1) / count);
-        let low = (request.domain.min - line) * scale;
-        let high = (request.domain.max - line) * scale;
-        place.hold_in_box(offset, &low, &high, residual);
+    let line = agent.start + agent.line * (T::from_count(node + 1) / count);
+    [(request.domain.min - line) * scale, (request.domain.max - line) * scale]
+}
+
+/// The point of a box nearest to `value`.
+fn held_in_box<T: Real, const DIM: usize>(
+    value: &Point<T, DIM>,
+    low: &Point<T, DIM>,
+    high: &Point<T, DIM>,
+) -> Point<T, DIM> {
+    let mut inside = *value;
+    for ((component, &low), &high) in inside.iter_mut().zip(low.iter()).zip(high.iter()) {
+        *component = component.clamp_to(low, high);
     }
+    inside
+}
+
+/// Whether a position is outside the domain by more than the tolerance.
+fn is_outside<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
+    request: &Request<'_, T, DIM, AGENTS>,
+    result: &Iterate<T, DIM, NODES, AGENTS>,
+) -> bool {
+    result.interior(request.frame).zip(request.frame.agent()).any(|(offsets, agent)| {
+        offsets.iter().enumerate().any(|(node, offset)| {
+            let [low, high] = walls(request, agent, node, result.pace);
+            norm_squared(&(offset - held_in_box(offset, &low, &high))) > request.tolerance.squared()
+        })
+    })
 }
 
 #[cfg(test)]

@@ -144,7 +144,7 @@ fn is_the_nearest_feasible_point() {
 
 #[test]
 fn warm_multipliers_save_steps_and_the_share_is_whole() {
-    let scenario = scenario(0.5, 50.0, None);
+    let scenario = scenario(0.03, 50.0, None);
     let view = scenario.view();
     let frame = Frame::<f64, 2, 2>::new(&view, 22.0);
     let mut projection = Projection::<f64, 2, 32, 2>::empty();
@@ -153,7 +153,7 @@ fn warm_multipliers_save_steps_and_the_share_is_whole() {
         frame: &frame,
         domain: &view.frame.domain,
         step: 1.0,
-        margin: 1e-5,
+        margin: 1e-4,
         tolerance: 5e-6,
         steps_max: 5_000,
     };
