@@ -23,7 +23,7 @@ use crate::metrics::sample::{Derivative, Sample, Situation};
 use crate::metrics::{Location, LocationAdjoint};
 use crate::model::jamming::{Emitter, error_factor, pull_error_factor};
 use crate::model::{dropout, ranging, soft_square};
-use crate::scenario::StoredSensor;
+use crate::scenario::{StoredSensor, View};
 
 /// Added to the diagonal of the information matrix, 1 / length unit squared.
 pub const INFO_FLOOR: f64 = 1e-12;
@@ -118,6 +118,66 @@ pub(super) fn forward<T: Real, const DIM: usize>(
     Some(factor(samples, weight_sum, variance_sum))
 }
 
+/// What location errors are made of, to the digits that a lattice needs, in one pass over the sensors; `None` where there are
+/// not more ranging sensors than dimensions.
+///
+/// Directions are taken from the first one, so that what cancels is no more than their spread about it; a pivot that is all
+/// rounding is held at the floor.
+pub(super) fn rough<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    emitters: &[Emitter<T, DIM>],
+    sensors_max: usize,
+) -> Option<Location<T>> {
+    let softening = scenario.frame.softening;
+    let (quieting, _) = dropout::variance_factor(situation.dropout);
+    let (mut count, mut weight_sum, mut variance_sum) = (0, T::zero(), T::zero());
+    let (mut from, mut mean) = (Point::<T, DIM>::zeros(), Point::<T, DIM>::zeros());
+    let mut rows = [Point::<T, DIM>::zeros(); DIM];
+    for sensor in scenario.sensors.iter().take(sensors_max) {
+        let Some(model) = &sensor.ranging else { continue };
+        let place = scenario.sensor_state(sensor, situation.time).0;
+        let offset = situation.position - place;
+        let square = soft_square(&offset, softening);
+        let mut variance = ranging::variance(model, square).value * quieting;
+        if !emitters.is_empty() && sensor.jam.error_gain != T::zero() {
+            variance *= error_factor(emitters, &place, &sensor.jam, softening);
+        }
+        let variance = variance.clamp_to(T::one() / T::LARGE, T::LARGE);
+        let weight = T::one() / variance;
+        let direction = match situation.reference {
+            None => offset / square.sqrt(),
+            Some(reference) => {
+                let offset = reference - place;
+                offset / soft_square(&offset, softening).sqrt()
+            }
+        };
+        if count == 0 {
+            from = direction;
+        }
+        let aside = direction - from;
+        for k in 0..DIM {
+            let weighted = aside[k] * weight;
+            mean[k] += weighted;
+            for l in 0..=k {
+                rows[k][l] += weighted * aside[l];
+            }
+        }
+        count += 1;
+        weight_sum += weight;
+        variance_sum += variance;
+    }
+    if count <= DIM {
+        return None;
+    }
+    for k in 0..DIM {
+        for l in 0..=k {
+            rows[k][l] -= mean[k] * mean[l] / weight_sum;
+        }
+    }
+    Some(located(rows, variance_sum))
+}
+
 /// Gram-Schmidt on the weighted columns 1, f_x, f_y .., the rows of the floor below them: takes the mean out of the
 /// residuals, then each column out of those after it.
 ///
@@ -180,6 +240,36 @@ fn factor<T: Real, const DIM: usize>(
         trace += crate::math::norm_squared(row) * scale;
     }
     Covariance { rows, scales, location: Location { trace, ln_det: -ln_product(&pivots), variance_sum } }
+}
+
+/// What location errors are made of, from the lower triangle of the information matrix, factored as T D T^T.
+#[expect(clippy::needless_range_loop, reason = "rows and columns by the letters of the equations")]
+fn located<T: Real, const DIM: usize>(mut rows: [Point<T, DIM>; DIM], variance_sum: T) -> Location<T> {
+    let mut pivots = Point::<T, DIM>::zeros();
+    // Rows of T^-1.
+    let mut inverse = [Point::<T, DIM>::zeros(); DIM];
+    let mut trace = T::zero();
+    for k in 0..DIM {
+        let mut pivot = rows[k][k];
+        for l in 0..k {
+            let mut entry = rows[k][l];
+            for m in 0..l {
+                entry -= rows[k][m] * rows[l][m] * pivots[m];
+            }
+            rows[k][l] = entry / pivots[l];
+            pivot -= rows[k][l] * entry;
+        }
+        pivots[k] = pivot.max(T::real(INFO_FLOOR));
+        inverse[k][k] = T::one();
+        for l in 0..k {
+            for m in l..k {
+                let part = rows[k][m] * inverse[m][l];
+                inverse[k][l] -= part;
+            }
+        }
+        trace += crate::math::norm_squared(&inverse[k]) / pivots[k];
+    }
+    Location { trace, ln_det: -ln_product(&pivots), variance_sum }
 }
 
 /// Logarithm of the product, through single logarithms only where the product could leave the range.

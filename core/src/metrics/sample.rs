@@ -133,6 +133,24 @@ pub(crate) fn figures<T: Real, const DIM: usize>(
     Values { detection: detection::value(scenario, situation, samples.len()), ..others }
 }
 
+/// The same, location errors with the digits that a lattice needs.
+#[inline]
+pub(crate) fn rough_figures<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    emitters: &[Emitter<T, DIM>],
+    needs: Needs,
+    samples: &mut [Sample<T, DIM>],
+) -> Values<T> {
+    if !needs.location || cfg!(feature = "compact") {
+        return figures(scenario, situation, emitters, needs, samples);
+    }
+    let rest = Needs { location: false, ..needs };
+    let others =
+        if rest.nothing() { Values::default() } else { figures(scenario, situation, emitters, rest, samples) };
+    Values { location: fisher::rough(scenario, situation, emitters, samples.len()), ..others }
+}
+
 /// Figures of one agent at one node, of the kinds that `needs` names.
 pub(crate) fn forward<T: Real, const DIM: usize>(
     scenario: &View<'_, T, DIM>,

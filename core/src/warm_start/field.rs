@@ -7,11 +7,13 @@
 //! A worst-case term is its log-sum-exp along the path, majorised by its tangent at an earlier path: that is a sum
 //! along the path again, and minimising it never makes the smoothed worst value worse.
 
+use core::cell::Cell;
+
 use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real};
-use crate::metrics::{Needs, Sample, Situation, Values, figures};
+use crate::metrics::{Needs, Sample, Situation, Values, rough_figures};
 use crate::model::jamming::Emitter;
 use crate::objective::needed_values;
 use crate::scenario::{
@@ -62,6 +64,8 @@ pub(super) struct Slice<T, const DIM: usize, const AGENTS: usize> {
     /// The others: where they are, and their coefficients.
     others: Vec<(Point<T, DIM>, Weights<T>), AGENTS>,
     emitters: Vec<Emitter<T, DIM>, AGENTS>,
+    /// What the others cost while this agent does not jam, once it was asked for.
+    idle: Cell<Option<T>>,
 }
 
 /// Coefficient of each term, and what they need.
@@ -190,8 +194,14 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         for limit in self.scenario.limits {
             own.needs.add(limit.metric);
         }
-        let mut slice =
-            Slice { window, time: start + duration * middle, own, others: Vec::new(), emitters: Vec::new() };
+        let mut slice = Slice {
+            window,
+            time: start + duration * middle,
+            own,
+            others: Vec::new(),
+            emitters: Vec::new(),
+            idle: Cell::new(None),
+        };
         let place = T::from_count(self.trajectory.intervals()) * middle;
         for (index, (agent, track)) in self.scenario.agents.iter().zip(self.trajectory.active()).enumerate() {
             if index == self.index {
@@ -305,18 +315,38 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         }
         let betrayal = self.agent.jammer.map_or(Betrayal::None, |jammer| jammer.betrayal);
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-        let values = figures(self.scenario, &here, emitters, slice.own.needs, scratch);
+        let values = rough_figures(self.scenario, &here, emitters, slice.own.needs, scratch);
         if self.scenario.limits.iter().any(|limit| is_outside(limit, &values)) {
             return T::INFINITY;
         }
         let mut rate = self.price(&slice.own, &values);
+        if !slice.others.is_empty() {
+            let known = slice.idle.get().filter(|_| level == T::zero() && !cfg!(feature = "compact"));
+            let others = known.unwrap_or_else(|| self.rate_of_others(slice, emitters, scratch));
+            if level == T::zero() {
+                slice.idle.set(Some(others));
+            }
+            rate += others;
+        }
+        if rate.finite() { rate } else { T::INFINITY }
+    }
+
+    /// Cost a second of the other agents, who are where they are.
+    #[inline(always)]
+    fn rate_of_others(
+        &self,
+        slice: &Slice<T, DIM, AGENTS>,
+        emitters: &[Emitter<T, DIM>],
+        scratch: &mut [Sample<T, DIM>],
+    ) -> T {
+        let mut rate = T::zero();
         for (position, weights) in slice.others.iter().filter(|(_, weights)| !weights.needs.nothing()) {
             let (dropout, level, betrayal) = (T::zero(), T::zero(), Betrayal::None);
             let there =
                 Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-            rate += self.price(weights, &figures(self.scenario, &there, emitters, weights.needs, scratch));
+            rate += self.price(weights, &rough_figures(self.scenario, &there, emitters, weights.needs, scratch));
         }
-        if rate.finite() { rate } else { T::INFINITY }
+        rate
     }
 
     /// Terms, summed.
@@ -366,7 +396,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
         let needs = Needs::of_limits(self.scenario.limits);
-        let values = figures(self.scenario, &here, &slice.emitters, needs, scratch);
+        let values = rough_figures(self.scenario, &here, &slice.emitters, needs, scratch);
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));
         found.map(Blocked::Limit)
     }

@@ -266,6 +266,13 @@ impl Move {
         to.wrapping_add_signed(-isize::from(self.jump))
     }
 
+    /// Rows of `across` cells, and cells along a row.
+    pub(super) fn by_rows(&self, across: usize) -> (isize, isize) {
+        let [ahead, ..] = self.offset.map(isize::from);
+        let across = isize::try_from(across.max(1)).unwrap_or(isize::MAX);
+        ((isize::from(self.jump) - ahead) / across, ahead)
+    }
+
     /// Cells by axis.
     pub(super) fn offset(&self) -> &[i8; DIM_MAX] {
         &self.offset

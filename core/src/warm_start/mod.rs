@@ -46,7 +46,7 @@ use field::{Field, SHARPNESS, Slice, Weights};
 use grid::Moves;
 use obstruction::{first_blocked, first_crossed};
 use routes::{Plan, Route, SLICES_MAX, SLICES_MIN};
-use sweep::{Block, Sweep};
+use sweep::{Block, Patch, Sweep};
 
 pub(crate) use equipment::{Level, Prices, azimuth_of_nearest, equip, equip_elsewhere};
 pub(crate) use field::LARGE_TEAM;
@@ -301,7 +301,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         let (start, goal) = (&field.agent.start, &field.agent.goal);
         let farthest = self.tables.moves.farthest();
         let mut routes = Routes::of(plan);
-        let mut alive = plan.grid.around(start, T::zero())?;
+        let mut alive = Patch::whole(plan.grid.around(start, T::zero())?);
         for number in 1..=plan.slices {
             let slice = field.slice(T::from_count(number - 1) / count, T::from_count(number) / count);
             let left = plan.reach * T::from_count(plan.slices - number);
@@ -310,11 +310,11 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             let reached = if number == 1 {
                 plan.grid.around(start, plan.reach)?.grown(1, counts)
             } else {
-                alive.grown(farthest, counts)
+                alive.block.grown(farthest, counts)
             };
             let arrives = number >= plan.fewest;
             let needed = if arrives { reached.hull(&plan.grid.around(goal, T::zero())?) } else { reached };
-            self.survey(field, plan, (&slice, &needed), caution, scratch);
+            self.survey(field, plan, (number, &slice, &needed), caution, scratch);
             if arrives && let Some((cost, last)) = self.arrive(field, plan, &slice, caution) {
                 let time = &field.scenario.frame.time;
                 let late = (slice.end() - time.target).max(T::zero());
@@ -326,6 +326,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
             }
             self.tables.next.iter_mut().take(cells).for_each(|cost| *cost = f32::INFINITY);
             let Some(wanted) = wanted.meet(&reached) else { break };
+            let wanted = Patch::of(&plan.grid, wanted, || plan.lens(field.agent, (number, plan.slices - number)));
             if number == 1 {
                 self.depart(field, plan, &slice, caution);
             } else {
@@ -357,7 +358,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         &mut self,
         field: &Field<'_, T, DIM, NODES, AGENTS>,
         plan: &Plan<T, DIM>,
-        (slice, needed): (&Slice<T, DIM, AGENTS>, &Block<DIM>),
+        (number, slice, needed): (usize, &Slice<T, DIM, AGENTS>, &Block<DIM>),
         caution: Caution,
         scratch: &mut [Sample<T, DIM>],
     ) {
@@ -374,11 +375,14 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         }
         let is_lasting = !field.is_moving();
         self.landscape.surveyed = Survey { is_known: is_lasting, ..key };
+        // What moves touch is as near to the start as their ends and to the goal as their beginnings, but for rounding.
+        let touched = (!is_lasting && !cfg!(feature = "compact"))
+            .then(|| plan.lens(field.agent, (number, plan.slices + 1 - number)).grown(plan.grid.size()));
         let needed = if is_lasting { Block::whole(&plan.grid.counts) } else { *needed };
         // A wall may be thinner than a cell: to be priced, it too has to grow.
         let margin = if caution == Caution::Bold { T::zero() } else { plan.grid.half_diagonal() };
         for ((at, center), rate) in plan.grid.iter().zip(&mut self.landscape.rates) {
-            if !needed.holds(&at) {
+            if !needed.holds(&at) || touched.as_ref().is_some_and(|touched| !touched.holds(&center)) {
                 continue;
             }
             let way = norm(&(center - field.agent.start)) + norm(&(field.agent.goal - center));
@@ -432,7 +436,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         field: &Field<'_, T, DIM, NODES, AGENTS>,
         plan: &Plan<T, DIM>,
         (number, slice): (usize, &Slice<T, DIM, AGENTS>),
-        blocks: (&Block<DIM>, &Block<DIM>),
+        patches: (&Patch<DIM>, &Patch<DIM>),
         caution: Caution,
     ) {
         let cells = plan.grid.cells();
@@ -446,7 +450,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         let clear = (!is_open).then_some(|from: usize, to: usize| {
             is_clear(field, slice, (&plan.grid.center_of(from), &plan.grid.center_of(to)), caution)
         });
-        sweep.run(&plan.grid.counts, moves.all(), blocks, clear);
+        sweep.run(&plan.grid.counts, moves.all(), patches, clear);
     }
 
     /// The last slice: to the goal itself.
@@ -460,7 +464,7 @@ impl<T: Real, const CELLS: usize, const PARENTS: usize> Lattice<'_, T, CELLS, PA
         let goal = field.agent.goal;
         let mut best = None;
         let near = plan.grid.around(&goal, plan.reach)?;
-        for cell in near.rows(&plan.grid.counts).flat_map(|(first, length)| first..first + length) {
+        for cell in near.cells(&plan.grid.counts) {
             let before = T::of_f32(self.tables.cost.get(cell).copied().unwrap_or(f32::INFINITY));
             let center = plan.grid.center_of(cell);
             if before == T::INFINITY || norm(&(goal - center)) > plan.reach {

@@ -14,6 +14,7 @@ use super::Variant;
 use super::equipment::Prices;
 use super::field::{Field, Slice};
 use super::grid::Grid;
+use super::sweep::Lens;
 
 /// Speed factor that the grid is laid for, whatever the variant's, so that all variants share its costs.
 const INFLATION_MAX: f64 = 1.25;
@@ -128,6 +129,14 @@ impl<T: Real, const DIM: usize> Plan<T, DIM> {
             }
             cells -= (cells / 16).max(1);
         }
+    }
+
+    /// What so many slices reach from the start, and from which so many reach the goal.
+    pub(super) fn lens(&self, agent: &Agent<T, DIM>, (behind, ahead): (usize, usize)) -> Lens<T, DIM> {
+        Lens(
+            [(agent.start, behind), (agent.goal, ahead)]
+                .map(|(end, slices)| (end, self.reach * T::from_count(slices))),
+        )
     }
 
     /// Flight time of so many slices, s.

@@ -3,18 +3,28 @@
 //! | symbol | name | unit | shape |
 //! |---|---|---|---|
 //! | | [`Block`] | cells | lowest and highest coordinates, both included |
+//! | | [`Lens`] | length unit | what a path can reach from the start and still reach the goal from |
+//! | | [`Patch`] | cells | what of a block is in a lens |
 //!
 //! Moves come first and cells second: a move does the same to a whole row of cells, one after the other in memory, which is
 //! what processors with vectors are quick at.
 //!
-//! Limits: a block is a box around what can be reached, which is round.
+//! Limits: rows past [`ROWS_MAX`] are as wide as the block, which is a box around what can be reached.
 
-use crate::math::{Point, Real};
+use heapless::Vec;
+
+use crate::math::{Point, Real, norm_squared};
 
 use super::grid::{Grid, Move};
 
 /// Cells that are done together.
 const CHUNK: usize = 32;
+/// Rows of a patch that know where they begin and end.
+const ROWS_MAX: usize = if cfg!(feature = "compact") { 0 } else { 192 };
+/// Sides of a cell by which a cell that a move looks at may be off its line: half a diagonal, and rounding.
+const ASTRAY: f64 = 1.0;
+/// Part of a cell by which a patch is larger than its lens, for rounding.
+const EDGE: f32 = 0.01;
 
 /// A box of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,23 +92,137 @@ impl<const DIM: usize> Block<DIM> {
         at.iter().zip(self.low.iter().zip(&self.high)).all(|(at, (low, high))| low <= at && at <= high)
     }
 
-    /// Its rows along the first coordinate: number of the first cell, and of cells.
-    pub(super) fn rows(&self, counts: &[usize; DIM]) -> impl Iterator<Item = (usize, usize)> {
-        let (block, counts) = (*self, *counts);
-        let sides = block.low.iter().zip(&block.high).skip(1).map(|(low, high)| high - low + 1);
-        let (rows, length) = (sides.product(), block.high.first().zip(block.low.first()));
-        let length = length.map_or(0, |(high, low)| high - low + 1);
-        (0..rows).map(move |row| {
-            let (mut rest, mut cell, mut stride) = (row, 0, 1);
-            for (axis, ((&low, &high), &count)) in block.low.iter().zip(&block.high).zip(&counts).enumerate() {
-                let side = if axis == 0 { 1 } else { high - low + 1 };
-                cell += (low + rest % side.max(1)) * stride;
-                rest /= side.max(1);
-                stride *= count;
-            }
-            (cell, length)
-        })
+    /// Its rows along the first coordinate, by number among all rows of the grid.
+    pub(super) fn rows(&self, counts: &[usize; DIM]) -> Rows<DIM> {
+        let mut left = 1;
+        for axis in 1..DIM {
+            left *= self.high[axis] - self.low[axis] + 1;
+        }
+        Rows { block: *self, counts: *counts, next: self.low, left }
     }
+
+    /// Its cells.
+    pub(super) fn cells(&self, counts: &[usize; DIM]) -> impl Iterator<Item = usize> + use<DIM> {
+        let ([low, high], across) = (self.across(), counts.first().copied().unwrap_or(1));
+        self.rows(counts).flat_map(move |row| row * across + low..row * across + high)
+    }
+
+    /// Its first coordinates, from the lowest to the one after the highest.
+    fn across(&self) -> [usize; 2] {
+        let side = self.low.first().zip(self.high.first());
+        side.map_or([0; 2], |(&low, &high)| [low, high + 1])
+    }
+}
+
+/// Numbers of a block's rows, one after the other.
+pub(super) struct Rows<const DIM: usize> {
+    block: Block<DIM>,
+    counts: [usize; DIM],
+    next: [usize; DIM],
+    left: usize,
+}
+
+impl<const DIM: usize> Iterator for Rows<DIM> {
+    type Item = usize;
+
+    #[cfg_attr(feature = "compact", inline(never))]
+    fn next(&mut self) -> Option<usize> {
+        self.left = self.left.checked_sub(1)?;
+        let row = row_of(&self.next, &self.counts);
+        for axis in 1..DIM {
+            if self.next[axis] < self.block.high[axis] {
+                self.next[axis] += 1;
+                break;
+            }
+            self.next[axis] = self.block.low[axis];
+        }
+        Some(row)
+    }
+}
+
+/// What is near enough to both ends of the path: a ball around each.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens<T, const DIM: usize>(pub(super) [(Point<T, DIM>, T); 2]);
+
+impl<T: Real, const DIM: usize> Lens<T, DIM> {
+    /// This lens and what is as near to it as the longest move strays from its line, with cells of that size.
+    pub(super) fn grown(self, size: T) -> Self {
+        Self(self.0.map(|(end, radius)| (end, radius + size * T::real(ASTRAY))))
+    }
+
+    /// Whether a position is in it.
+    pub(super) fn holds(&self, position: &Point<T, DIM>) -> bool {
+        self.0.iter().all(|(end, radius)| norm_squared(&(position - end)) <= *radius * *radius)
+    }
+}
+
+/// The part of a block that is in a lens: from the first cell of a row to the one after the last.
+#[derive(Clone, Debug)]
+pub(super) struct Patch<const DIM: usize> {
+    pub(super) block: Block<DIM>,
+    /// Number of the block's first row among all rows of the grid.
+    first: usize,
+    /// Of all rows from that on, as many as there is room for; the others are as wide as the block.
+    rows: Vec<[u16; 2], ROWS_MAX>,
+}
+
+impl<const DIM: usize> Patch<DIM> {
+    /// All of a block.
+    pub(super) fn whole(block: Block<DIM>) -> Self {
+        Self { block, first: 0, rows: Vec::new() }
+    }
+
+    /// What of a block is in a lens, and of its edge a little more.
+    pub(super) fn of<T: Real>(grid: &Grid<T, DIM>, block: Block<DIM>, lens: impl FnOnce() -> Lens<T, DIM>) -> Self {
+        if ROWS_MAX == 0 {
+            return Self::whole(block);
+        }
+        let lens = lens();
+        let counts = &grid.counts;
+        let [first, last] = [row_of(&block.low, counts), row_of(&block.high, counts)];
+        let across = counts.first().copied().unwrap_or(1);
+        let pitch = grid.pitch.iter().next().copied().unwrap_or(T::one());
+        let mut patch = Self { block, first, rows: Vec::new() };
+        for row in (first..=last).take(ROWS_MAX) {
+            let center = grid.center_of(row * across);
+            let [mut low, mut high] = block.across();
+            for (end, radius) in &lens.0 {
+                let offset = end - center;
+                let along = offset.iter().next().copied().unwrap_or_default();
+                let rest = *radius * *radius - (norm_squared(&offset) - along * along);
+                if rest < T::zero() {
+                    high = 0;
+                    break;
+                }
+                let half = rest.sqrt();
+                let [from, until] = [(along - half) / pitch, (along + half) / pitch].map(T::to_f32);
+                let from = (from - EDGE).max(0.0);
+                let begin = from as usize;
+                low = low.max(if from > begin as f32 { begin + 1 } else { begin });
+                high = high.min(if until < -EDGE { 0 } else { (until + EDGE) as usize + 1 });
+            }
+            let range = [low, high.max(low)].map(|cell| u16::try_from(cell).unwrap_or(u16::MAX));
+            // No more than there is room for.
+            let _ = patch.rows.push(range);
+        }
+        patch
+    }
+
+    /// The cells of a row that are in it, from the first coordinate to the one after the last.
+    fn range(&self, row: usize) -> [usize; 2] {
+        let known = self.rows.get(row.wrapping_sub(self.first)).filter(|_| ROWS_MAX > 0);
+        known.map_or(self.block.across(), |range| range.map(usize::from))
+    }
+}
+
+/// Number of a cell's row among all rows of the grid.
+fn row_of<const DIM: usize>(at: &[usize; DIM], counts: &[usize; DIM]) -> usize {
+    let (mut row, mut stride) = (0, 1);
+    for axis in 1..DIM {
+        row += at[axis] * stride;
+        stride *= counts[axis];
+    }
+    row
 }
 
 /// What one slice works on; all lists are of cells.
@@ -112,18 +236,31 @@ pub(super) struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Takes the moves in turn from the block `alive` to the block `wanted`; `clear` is asked whether a move from a cell to
+    /// Takes the moves in turn from what is `alive` to what is `wanted`; `clear` is asked whether a move from a cell to
     /// another is open, or nothing is where it is `None`.
     pub(super) fn run<const DIM: usize>(
         &mut self,
         counts: &[usize; DIM],
         moves: &[Move],
-        (alive, wanted): (&Block<DIM>, &Block<DIM>),
+        (alive, wanted): (&Patch<DIM>, &Patch<DIM>),
         mut clear: Option<impl FnMut(usize, usize) -> bool>,
     ) {
+        let across = counts.first().copied().unwrap_or(1);
         for (number, step) in (0..=u8::MAX).zip(moves) {
-            let Some(to) = alive.moved(step, counts).and_then(|moved| moved.meet(wanted)) else { continue };
-            for (mut cell, mut left) in to.rows(counts) {
+            let moved = alive.block.moved(step, counts).and_then(|moved| moved.meet(&wanted.block));
+            let Some(to) = moved else { continue };
+            let (aside, ahead) = if ROWS_MAX > 0 { step.by_rows(across) } else { (0, 0) };
+            for row in to.rows(counts) {
+                let [mut low, mut high] = to.across();
+                if ROWS_MAX > 0 {
+                    let from = alive.range(row.wrapping_add_signed(-aside));
+                    let from = from.map(|cell| cell.saturating_add_signed(ahead));
+                    for [begin, end] in [wanted.range(row), from] {
+                        (low, high) = (low.max(begin), high.min(end));
+                    }
+                }
+                let mut cell = row * across + low;
+                let mut left = high.saturating_sub(low);
                 while left > 0 {
                     let length = left.min(CHUNK);
                     self.relax((number, step), cell, length, clear.as_mut());

@@ -318,7 +318,7 @@ fn a_full_list_of_moves_stays_in_the_grid() {
     assert!(moves.all().len() > 200, "{}", moves.all().len());
     let (mut cost, mut next) = (List::from([1.0; 1024]), List::from([f32::INFINITY; 1024]));
     let (landscape, mut parents) = (List::from([1.0; 1024]), List::from([0_u8; 1024]));
-    let whole = sweep::Block::whole(&grid.counts);
+    let whole = sweep::Patch::whole(sweep::Block::whole(&grid.counts));
     let cells = grid.cells();
     cost.truncate(cells);
     let mut sweep =
@@ -347,7 +347,7 @@ fn a_sweep_takes_the_least_of_all_moves() {
     let landscape: List<f32> = (0..cells).map(|_| draw()).collect();
     let cost: List<f32> = (0..cells).map(|_| draw()).collect();
     let (mut next, mut parents) = (List::from([f32::INFINITY; 400]), List::from([0_u8; 400]));
-    let whole = sweep::Block::whole(&grid.counts);
+    let whole = sweep::Patch::whole(sweep::Block::whole(&grid.counts));
     let mut sweep =
         Sweep { landscape: &landscape, cost: &cost, next: &mut next, parents: &mut parents, interval: 0.5 };
     sweep.run(&grid.counts, moves.all(), (&whole, &whole), None::<fn(usize, usize) -> bool>);
