@@ -170,7 +170,7 @@ where
         inside: T::one(),
         times: Times::Free,
         patience: 0,
-        has_rival: false,
+        rival: None,
         keeps: Keeps::Better,
     };
     let (status, closing) = if !first.finite() {
@@ -276,8 +276,9 @@ struct Ledger<T> {
     times: Times,
     /// Steps that a refinement takes beyond its limit while it has gained nothing or is not at a second barrier parameter.
     patience: usize,
-    /// Whether a refinement ends once it comes to the way of `workspace.champion`.
-    has_rival: bool,
+    /// What the champion is worth in `workspace.champion`: a refinement ends once it comes to the same way, or has no more hope
+    /// to be better.
+    rival: Option<T>,
     keeps: Keeps,
 }
 

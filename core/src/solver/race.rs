@@ -199,10 +199,10 @@ impl<'a, T: Real, const DIM: usize> Race<'a, T, DIM> {
         ledger.patience = if settings.refinements > POLISH_REFINEMENTS && !is_large { PATIENCE } else { 0 };
         let first = ledger.first;
         ledger.first = first * T::real(CANDIDATE);
-        ledger.has_rival = found.status != Status::Infeasible;
+        ledger.rival = (found.status != Status::Infeasible).then_some(found.least);
         let (sides, laid) = (Sides::of(scenario, &workspace.best), ledger.best);
         let status = polish(scenario, &short, workspace, ledger, deadline);
-        (ledger.first, ledger.patience, ledger.has_rival) = (first, 0, false);
+        (ledger.first, ledger.patience, ledger.rival) = (first, 0, None);
         let is_alike = found.status != Status::Infeasible && is_alike(&workspace.best, &workspace.champion, ALIKE);
         let level = if is_alike { found.level } else { ledger.best };
         let new = Found { status, least: ledger.best, slack: T::zero(), barrier: ledger.barrier, level };
@@ -352,6 +352,11 @@ impl<T: Real, const DIM: usize> Race<'_, T, DIM> {
         workspace.best.assign(&workspace.champion);
         (ledger.best, ledger.barrier) = (self.found.least, self.found.barrier);
         ledger.times = Times::Held;
+        // A candidate that has come to the end is there, unless an instant at which terms change may have held it up.
+        let is_done = self.found.status == Status::Converged && !cfg!(feature = "compact");
+        if is_done && neighbours::piece(self.scenario, workspace.best.duration()).iter().all(Option::is_none) {
+            return Status::Converged;
+        }
         polish(self.scenario, self.settings, workspace, ledger, deadline)
     }
 

@@ -192,15 +192,15 @@ impl Moves {
     pub(super) fn collect<T: Real, const DIM: usize>(&mut self, grid: &Grid<T, DIM>, reach: T) {
         self.count = 0;
         let most = i8::try_from(BETWEEN_MAX + 1).unwrap_or(i8::MAX);
-        let side = usize::from(most.unsigned_abs()) * 2 + 1;
         let reach_squared = reach * reach * T::real(1.0 + 1e-6);
         // Ring by ring, so that what does not fit is what reaches farthest.
         for ring in 0..=most {
+            let (side, before) = (usize::from(ring.unsigned_abs()) * 2 + 1, self.count);
             for index in 0..side.pow(u32::try_from(DIM).unwrap_or(0)) {
                 let mut offset = [0_i8; DIM_MAX];
                 let mut rest = index;
                 for component in offset.iter_mut().take(DIM) {
-                    *component = i8::try_from(rest % side).unwrap_or(0) - most;
+                    *component = i8::try_from(rest % side).unwrap_or(0) - ring;
                     rest /= side;
                 }
                 let farthest = offset.iter().map(|cells| cells.abs()).max().unwrap_or(0);
@@ -219,6 +219,10 @@ impl Moves {
                     *slot = Move::new(&offset, farthest, &grid.counts);
                     self.count += 1;
                 }
+            }
+            // Rings farther out are out of reach too.
+            if self.count == before {
+                return;
             }
         }
     }

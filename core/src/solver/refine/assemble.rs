@@ -16,7 +16,8 @@ use crate::solver::controls::{Bound, KINDS, Kind};
 use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
 use crate::trajectory::Trajectory;
 
-use super::barrier::{Multipliers, for_each_wall, held};
+use super::barrier::{Multipliers, Range, for_each_wall, held};
+use super::block::Block;
 use super::extremes::Extremes;
 use super::limits::Limits;
 use super::rows::{Ball, for_each_ball, index};
@@ -46,7 +47,7 @@ pub(super) struct Source<'a, T, const DIM: usize, const NODES: usize, const AGEN
     /// mu.
     pub(super) barrier: T,
     /// Multipliers are taken within this factor of mu / g.
-    pub(super) range: T,
+    pub(super) range: Range<T>,
 }
 
 impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<'_, T, DIM, NODES, AGENTS> {
@@ -73,11 +74,24 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
     ) -> T {
+        let (variables, roles) = self.variables(agent);
+        let pace = self.iterate.pace;
+        let scale = agent.stride / pace;
+        let mut at = At {
+            agent_index: index,
+            node: 0,
+            variables,
+            roles: &roles,
+            scale,
+            by_pace: T::one() / pace,
+            interval: self.frame.interval / pace,
+        };
         let mut sum = T::zero();
         for node in 1..=self.frame.intervals {
-            sum += self.node(index, agent, node, system, scratch);
+            at.node = node;
+            sum += self.node(&at, system, scratch);
         }
-        sum * (self.frame.interval / self.iterate.pace)
+        sum * at.interval
     }
 
     fn balls(
@@ -90,8 +104,9 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let intervals = self.frame.intervals;
         for_each_ball(self.frame, agent, offsets, self.iterate.pace, |place, ball| {
             let Some(multiplier) = multipliers.of_ball(place, intervals) else { return };
-            *multiplier = held(*multiplier, self.barrier / ball.slack(), self.range);
-            add_ball(ball, *multiplier, system);
+            let push = T::one() / ball.slack();
+            *multiplier = held(*multiplier, self.barrier * push, self.range);
+            add_ball(ball, *multiplier, push, system);
         });
     }
 
@@ -161,31 +176,22 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
     }
 
     /// Objective, limits and worst values at a node; returns its part of the objective, a second.
-    fn node(
-        &self,
-        agent_index: usize,
-        agent: &AgentFrame<T, DIM>,
-        node: usize,
-        system: &mut System<T, DIM, NODES>,
-        scratch: &mut [Sample<T, DIM>],
-    ) -> T {
-        let (variables, roles) = self.variables(agent);
-        let at = At { agent_index, agent, node, variables, roles: &roles };
+    fn node(&self, at: &At<'_, T>, system: &mut System<T, DIM, NODES>, scratch: &mut [Sample<T, DIM>]) -> T {
         // Fewer layouts take less code, and more figures that are zero.
-        match roles.len() {
-            0..=4 if cfg!(feature = "compact") => self.node_of::<4>(&at, system, scratch),
-            3.. if cfg!(feature = "compact") => self.node_of::<VARIABLES_MAX>(&at, system, scratch),
-            0..=2 => self.node_of::<2>(&at, system, scratch),
-            3 => self.node_of::<3>(&at, system, scratch),
-            4 => self.node_of::<4>(&at, system, scratch),
-            5 | 6 => self.node_of::<6>(&at, system, scratch),
-            _ => self.node_of::<VARIABLES_MAX>(&at, system, scratch),
+        match at.roles.len() {
+            0..=4 if cfg!(feature = "compact") => self.node_of::<4>(at, system, scratch),
+            3.. if cfg!(feature = "compact") => self.node_of::<VARIABLES_MAX>(at, system, scratch),
+            0..=2 => self.node_of::<2>(at, system, scratch),
+            3 => self.node_of::<3>(at, system, scratch),
+            4 => self.node_of::<4>(at, system, scratch),
+            5 | 6 => self.node_of::<6>(at, system, scratch),
+            _ => self.node_of::<VARIABLES_MAX>(at, system, scratch),
         }
     }
 
     fn node_of<const M: usize>(
         &self,
-        at: &At<'_, T, DIM>,
+        at: &At<'_, T>,
         system: &mut System<T, DIM, NODES>,
         scratch: &mut [Sample<T, DIM>],
     ) -> T {
@@ -197,8 +203,12 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
         let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &integrals, scratch);
         let jet = self.shared(jet, at);
         let value = jet.value;
-        place.add_slopes(&jet, self.frame.interval / self.iterate.pace, Target::Objective, system);
-        place.add(&jet, self.frame.interval / self.iterate.pace, Share::Integral, system);
+        if M == DIM && !cfg!(feature = "compact") {
+            place.add_position(&jet, at.interval, system);
+        } else {
+            place.add_slopes(&jet, at.interval, Target::Objective, system);
+            place.add(&jet, at.interval, Share::Integral, system);
+        }
         if !scenario.limits.is_empty() {
             let limits = Limits { scenario };
             let jet: Jet<T, M> = node_curvature(scenario, trajectory, agent, node, &at.variables, &limits, scratch);
@@ -218,7 +228,7 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
     }
 
     /// The jet without what other agents' jets of the same node count too: how everyone's figures change with time.
-    fn shared<const M: usize>(&self, mut jet: Jet<T, M>, at: &At<'_, T, DIM>) -> Jet<T, M> {
+    fn shared<const M: usize>(&self, mut jet: Jet<T, M>, at: &At<'_, T>) -> Jet<T, M> {
         let Some(time) = at.variables.time.filter(|&time| time < M && self.frame.agents > 1) else { return jet };
         let part = T::one() / T::from_count(self.frame.agents);
         jet.gradient[time] *= part;
@@ -264,21 +274,22 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
 fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
     ball: &Ball<T, DIM>,
     multiplier: T,
+    by_slack: T,
     system: &mut System<T, DIM, NODES>,
 ) {
     let (two, four) = (T::real(2.0), T::real(4.0));
     let interior = system.intervals.saturating_sub(1);
-    let slack = ball.slack();
-    let mut bend = ball.value * ball.value.transpose() * (four * multiplier / slack);
+    let stiffness = four * multiplier * by_slack;
+    let mut bend = ball.value * ball.value.transpose() * stiffness;
     for k in 0..DIM {
         bend[(k, k)] += two * multiplier;
     }
-    let by_radius = ball.value * (-four * multiplier * ball.radius * ball.radius_by_pace / slack);
+    let by_radius = ball.value * (-stiffness * ball.radius * ball.radius_by_pace);
     let along_pace = bend * ball.by_pace + by_radius;
     let radial = two * multiplier * ball.radius_by_pace * ball.radius_by_pace;
-    let push = two / slack;
+    let push = two * by_slack;
     system.border[PACE][PACE] += ball.by_pace.dot(&(along_pace + by_radius))
-        + radial * (ball.radius * ball.radius + norm_squared(&ball.value)) / slack;
+        + radial * (ball.radius * ball.radius + norm_squared(&ball.value)) * by_slack;
     system.border_centre[PACE] += push * ball.half_slack_by_pace();
     for (a, &weight_a) in ball.weights.iter().enumerate() {
         let Some(row) = index(ball.first, a).filter(|&row| row < interior && weight_a != T::zero()) else { continue };
@@ -302,12 +313,15 @@ fn add_ball<T: Real, const DIM: usize, const NODES: usize>(
 }
 
 /// A node of an agent.
-struct At<'a, T, const DIM: usize> {
+struct At<'a, T> {
     agent_index: usize,
-    agent: &'a AgentFrame<T, DIM>,
     node: usize,
     variables: Variables,
     roles: &'a [Role],
+    /// kappa, 1 / r and h / r.
+    scale: T,
+    by_pace: T,
+    interval: T,
 }
 
 /// What the value of a node enters the objective by.
@@ -336,7 +350,8 @@ struct Place<'a, T> {
     interior: usize,
     /// kappa.
     scale: T,
-    pace: T,
+    /// 1 / r.
+    by_pace: T,
     /// Change of each variable with the pace.
     along: [T; VARIABLES_MAX],
 }
@@ -344,11 +359,11 @@ struct Place<'a, T> {
 impl<'a, T: Real> Place<'a, T> {
     fn new<const DIM: usize, const NODES: usize, const AGENTS: usize>(
         source: &Source<'_, T, DIM, NODES, AGENTS>,
-        at: &At<'a, T, DIM>,
+        at: &At<'a, T>,
         time: T,
     ) -> Self {
-        let pace = source.iterate.pace;
-        let scale = at.agent.stride / pace;
+        let (scale, by_pace) = (at.scale, at.by_pace);
+        let shrinking = -scale * by_pace;
         let offsets = source.iterate.offset.get(at.agent_index).map(|nodes| nodes.as_slice()).unwrap_or_default();
         let offset = |node: usize, component: usize| {
             offsets.get(node).and_then(|offset| offset.get(component)).copied().unwrap_or_default()
@@ -356,14 +371,14 @@ impl<'a, T: Real> Place<'a, T> {
         let mut along = [T::zero(); VARIABLES_MAX];
         for (along, role) in along.iter_mut().zip(at.roles) {
             *along = match *role {
-                Role::Here(component) => -offset(at.node, component) * scale / pace,
-                Role::Before(component) => -offset(at.node - 1, component) * scale / pace,
+                Role::Here(component) => offset(at.node, component) * shrinking,
+                Role::Before(component) => offset(at.node - 1, component) * shrinking,
                 Role::Control(_) => T::zero(),
-                Role::Time => -(time - source.frame.start_time) / pace,
+                Role::Time => -(time - source.frame.start_time) * by_pace,
             };
         }
         let interior = source.frame.intervals.saturating_sub(1);
-        Self { roles: at.roles, index: at.node - 1, interior, scale, pace, along }
+        Self { roles: at.roles, index: at.node - 1, interior, scale, by_pace, along }
     }
 
     /// Factor between a variable and its unknown.
@@ -372,6 +387,43 @@ impl<'a, T: Real> Place<'a, T> {
             Role::Here(_) | Role::Before(_) => self.scale,
             Role::Control(_) => T::one(),
             Role::Time => T::zero(),
+        }
+    }
+
+    /// Adds `weight` times an integral's derivatives, where the position is all that varies.
+    #[inline]
+    fn add_position<const DIM: usize, const NODES: usize, const M: usize>(
+        &self,
+        jet: &Jet<T, M>,
+        weight: T,
+        system: &mut System<T, DIM, NODES>,
+    ) {
+        let factor = self.scale * weight;
+        let pair = factor * self.scale;
+        let (mut slope, mut bend) = (T::zero(), T::zero());
+        let (mut moved, mut column) = (Point::<T, DIM>::zeros(), Point::<T, DIM>::zeros());
+        let mut block = Block::<T, DIM>::zeros();
+        for a in 0..M.min(DIM) {
+            let mut along = T::zero();
+            for b in 0..M.min(DIM) {
+                along += jet.hessian[a][b] * self.along[b];
+                block[(a, b)] = pair * jet.hessian[a][b];
+            }
+            slope += jet.gradient[a] * self.along[a];
+            bend += along * self.along[a];
+            moved[a] = factor * jet.gradient[a];
+            column[a] = factor * (along - T::real(2.0) * jet.gradient[a] * self.by_pace);
+        }
+        system.border[PACE][PACE] += weight * (bend - T::real(4.0) * slope * self.by_pace);
+        system.border_right[PACE] -= weight * slope;
+        if self.index >= self.interior {
+            return;
+        }
+        let rows = system.rows.get_mut(self.index).zip(system.columns[PACE].path.get_mut(self.index));
+        if let Some(((row, by_pace), right)) = rows.zip(system.right.path.get_mut(self.index)) {
+            row.here += block;
+            *by_pace += column;
+            *right -= moved;
         }
     }
 
@@ -400,14 +452,14 @@ impl<'a, T: Real> Place<'a, T> {
                 _ => T::zero(),
             };
             let factor = self.factor(role) * weight;
-            self.add_to_column(role, PACE, factor * (along + scaled * jet.gradient[a] / self.pace), system);
+            self.add_to_column(role, PACE, factor * (along + scaled * jet.gradient[a] * self.by_pace), system);
             for (b, &other) in self.roles.iter().enumerate().take(M) {
                 self.add_pair(role, other, factor * self.factor(other) * jet.hessian[a][b], system);
             }
         }
         let own = match share {
-            Share::Integral => -T::real(4.0) * slope / self.pace,
-            Share::Node => -two * slope / self.pace,
+            Share::Integral => -T::real(4.0) * slope * self.by_pace,
+            Share::Node => -two * slope * self.by_pace,
         };
         system.border[PACE][PACE] += weight * (bend + own);
     }

@@ -14,10 +14,23 @@ use crate::solver::coordinates::{AgentFrame, Frame, Iterate};
 
 use super::rows::for_each_ball;
 
+/// A factor, and one over it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Range<T> {
+    most: T,
+    least: T,
+}
+
+impl<T: Real> Range<T> {
+    pub(super) fn of(factor: T) -> Self {
+        Self { most: factor, least: T::one() / factor }
+    }
+}
+
 /// A multiplier within a factor of its central value mu / g.
 #[inline]
-pub(super) fn held<T: Real>(multiplier: T, central: T, range: T) -> T {
-    multiplier.max(central / range).min(central * range)
+pub(super) fn held<T: Real>(multiplier: T, central: T, range: Range<T>) -> T {
+    multiplier.max(central * range.least).min(central * range.most)
 }
 
 /// The multipliers of one agent; those of worst values are always central.

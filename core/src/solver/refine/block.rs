@@ -1,7 +1,7 @@
 //! Symmetric positive definite systems with blocks of one node, each coupled to its two neighbours on either side.
 //!
 //! The speed bound couples neighbouring nodes, the acceleration bound those two apart: a block matrix with two
-//! diagonals on either side, factored as L L' in O(N).
+//! diagonals on either side, factored as L D L' in O(N), without a root.
 //!
 //! Limits: `NODES` bounds the number of blocks.
 
@@ -30,31 +30,30 @@ impl<T: Real, const DIM: usize> BlockRow<T, DIM> {
     }
 }
 
-/// Lower triangle of a positive definite block; `None` if it is not. Diagonal entries are stored inverted.
-fn cholesky<T: Real, const DIM: usize>(block: &Block<T, DIM>, floor: T) -> Option<Block<T, DIM>> {
-    let mut lower = Block::<T, DIM>::zeros();
-    for column in 0..DIM {
-        let mut pivot = block[(column, column)];
-        for k in 0..column {
-            pivot -= lower[(column, k)] * lower[(column, k)];
+/// The factor of a positive definite block: a unit lower triangle, with one over the pivots on its diagonal; `None` if it is
+/// not.
+fn triangle<T: Real, const DIM: usize>(block: &Block<T, DIM>, floor: T) -> Option<Block<T, DIM>> {
+    let (mut lower, mut scaled) = (Block::<T, DIM>::zeros(), Block::<T, DIM>::zeros());
+    for row in 0..DIM {
+        let mut pivot = block[(row, row)];
+        for column in 0..row {
+            let mut entry = block[(row, column)];
+            for k in 0..column {
+                entry -= scaled[(row, k)] * lower[(column, k)];
+            }
+            scaled[(row, column)] = entry;
+            lower[(row, column)] = entry * lower[(column, column)];
+            pivot -= entry * lower[(row, column)];
         }
         if pivot.is_not_a_number() || pivot <= floor {
             return None;
         }
-        let inverse = T::one() / pivot.sqrt();
-        lower[(column, column)] = inverse;
-        for row in column + 1..DIM {
-            let mut sum = block[(row, column)];
-            for k in 0..column {
-                sum -= lower[(row, k)] * lower[(column, k)];
-            }
-            lower[(row, column)] = sum * inverse;
-        }
+        lower[(row, row)] = T::one() / pivot;
     }
     Some(lower)
 }
 
-/// C^-1 v for a factor with inverted diagonal.
+/// L^-1 v.
 fn forward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, DIM>) -> Point<T, DIM> {
     let mut result = *vector;
     for row in 0..DIM {
@@ -62,12 +61,11 @@ fn forward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, D
             let known = result[k];
             result[row] -= lower[(row, k)] * known;
         }
-        result[row] *= lower[(row, row)];
     }
     result
 }
 
-/// C^-T v for a factor with inverted diagonal.
+/// L^-T v.
 fn backward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, DIM>) -> Point<T, DIM> {
     let mut result = *vector;
     for row in (0..DIM).rev() {
@@ -75,12 +73,11 @@ fn backward<T: Real, const DIM: usize>(lower: &Block<T, DIM>, vector: &Point<T, 
             let known = result[k];
             result[row] -= lower[(k, row)] * known;
         }
-        result[row] *= lower[(row, row)];
     }
     result
 }
 
-/// M C^-T: every row of M, forward.
+/// M L^-T: every row of M, forward.
 fn right_divide<T: Real, const DIM: usize>(matrix: &Block<T, DIM>, lower: &Block<T, DIM>) -> Block<T, DIM> {
     let mut result = *matrix;
     for row in 0..DIM {
@@ -89,6 +86,16 @@ fn right_divide<T: Real, const DIM: usize>(matrix: &Block<T, DIM>, lower: &Block
                 let known = result[(row, k)];
                 result[(row, column)] -= known * lower[(column, k)];
             }
+        }
+    }
+    result
+}
+
+/// M D^-1.
+fn scaled<T: Real, const DIM: usize>(matrix: &Block<T, DIM>, lower: &Block<T, DIM>) -> Block<T, DIM> {
+    let mut result = *matrix;
+    for row in 0..DIM {
+        for column in 0..DIM {
             result[(row, column)] *= lower[(column, column)];
         }
     }
@@ -102,19 +109,17 @@ pub(super) fn factor<T: Real, const DIM: usize>(rows: &mut [BlockRow<T, DIM>], f
     let mut above = BlockRow::<T, DIM>::zeros();
     let mut above_two = BlockRow::<T, DIM>::zeros();
     for (index, row) in rows.iter_mut().enumerate() {
-        if index < 2 {
-            row.two = Block::zeros();
-        } else {
-            row.two = right_divide(&row.two, &above_two.here);
+        // Entries of the factor times their pivots.
+        let (mut one, mut two) = (Block::<T, DIM>::zeros(), Block::<T, DIM>::zeros());
+        if index >= 2 {
+            two = right_divide(&row.two, &above_two.here);
         }
-        if index < 1 {
-            row.one = Block::zeros();
-        } else {
-            let one = row.one - row.two * above.one.transpose();
-            row.one = right_divide(&one, &above.here);
+        if index >= 1 {
+            one = right_divide(&(row.one - two * above.one.transpose()), &above.here);
         }
-        let here = row.here - row.two * row.two.transpose() - row.one * row.one.transpose();
-        let Some(lower) = cholesky(&here, floor) else { return false };
+        (row.one, row.two) = (scaled(&one, &above.here), scaled(&two, &above_two.here));
+        let here = row.here - two * row.two.transpose() - one * row.one.transpose();
+        let Some(lower) = triangle(&here, floor) else { return false };
         row.here = lower;
         (above_two, above) = (above, *row);
     }
@@ -183,7 +188,10 @@ impl<T: Real, const DIM: usize> Pulls<T, DIM> {
 
     #[inline(always)]
     fn backward(&mut self, row: &BlockRow<T, DIM>, value: &mut Point<T, DIM>) {
-        let rest = *value - self.one - self.two;
+        let mut rest = -(self.one + self.two);
+        for component in 0..DIM {
+            rest[component] += value[component] * row.here[(component, component)];
+        }
         *value = backward(&row.here, &rest);
         self.one = row.one.transpose() * *value;
         self.two = self.two_next;

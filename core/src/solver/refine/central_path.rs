@@ -46,6 +46,13 @@ const CENTRAL_RANGE: f64 = 1e4;
 const SPENT: usize = 2;
 /// Steps after which a candidate may have come to the champion's way.
 const JOIN_AFTER: usize = 2;
+/// A candidate is given up once what its step predicts, and this part of its barrier parameter for every slack, is too little
+/// to come to what the champion is worth.
+const LEFT: f64 = 0.5;
+/// Barrier parameter over max(1, |objective|) from which on a candidate goes on to the end, and the most steps that it takes
+/// for that: it would take as many to come back there later.
+const NEAR_END: f64 = 1e-7;
+const LAST_STEPS: usize = 6;
 /// A refinement is held up by an instant at which terms change when it goes less than this part of so many steps in a row.
 const HELD_UP: (f64, usize) = (0.05, 2);
 
@@ -130,8 +137,10 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         ledger.evaluations += 1;
         let (known, first) = (ledger.best, self.barrier);
         let (mut short, mut spent) = (0, 0);
+        let near_end = T::real(NEAR_END) * known.abs().max(T::one());
         for step in 0..steps + ledger.patience {
-            if step >= steps && ledger.best < known && self.barrier < first {
+            let is_ending = self.barrier <= near_end && step < steps + LAST_STEPS && !cfg!(feature = "compact");
+            if step >= steps && ledger.best < known && self.barrier < first && !is_ending {
                 break;
             }
             if deadline() {
@@ -152,8 +161,11 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             if spent >= SPENT && self.barrier > self.barrier_last {
                 (spent, self.barrier) = (0, self.lower());
             }
-            let is_joining = ledger.has_rival && step >= JOIN_AFTER && !cfg!(feature = "compact");
-            if is_joining && race::has_joined(self.scenario, &workspace.trial, &workspace.champion) {
+            let rival = ledger.rival.filter(|_| step >= JOIN_AFTER && !cfg!(feature = "compact"));
+            if let Some(rival) = rival
+                && (race::has_joined(self.scenario, &workspace.trial, &workspace.champion)
+                    || share > T::real(0.5) && self.barrier < first && self.promise(&newton) > rival)
+            {
                 return Followed::To(Status::IterationLimit);
             }
             short = if share < T::real(HELD_UP.0) { short + 1 } else { 0 };
@@ -179,6 +191,11 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
     fn little(&self, part: f64) -> T {
         let slacks = self.frame.agents * self.frame.intervals * (2 + 2 * DIM);
         T::from_count(slacks) * T::real(part) * self.barrier
+    }
+
+    /// What the objective comes to at the best, as far as the last step tells, which has been taken.
+    fn promise(&self, step: &Move<T, AGENTS>) -> T {
+        self.objective + self.extremes.total() + step.slope - self.little(LEFT)
     }
 
     /// The next barrier parameter.
