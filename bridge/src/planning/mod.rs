@@ -36,9 +36,23 @@ use crate::capacity;
 /// double precision, for the copies that unoptimised builds make. Pages that are not touched cost nothing.
 pub const STACK_BYTES: usize = 256 << 20;
 
+/// What planning uses of its stack at the most in optimised builds, and some more, bytes.
+const USED_BYTES: usize = 128 << 10;
+
+/// Has the system give the part of the stack that planning uses: it gives memory page by page as it is first touched, which
+/// takes as long as a short replan.
+#[inline(never)]
+fn touch_stack() {
+    std::hint::black_box(&mut [0_u8; USED_BYTES]);
+}
+
 /// Runs `work` on a stack of [`STACK_BYTES`].
 fn on_large_stack<V: Send>(work: impl FnOnce() -> V + Send) -> V {
     std::thread::scope(|scope| {
+        let work = || {
+            touch_stack();
+            work()
+        };
         let thread = std::thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, work);
         let done = thread.map(std::thread::ScopedJoinHandle::join);
         match done {

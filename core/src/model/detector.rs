@@ -45,8 +45,9 @@ pub fn detection<T: Real>(detection: &Detection<T>, square: T) -> Probability<T>
             let inverse = T::one() / denominator;
             let value = scale * inverse;
             let share = T::one() - epsilon * inverse;
-            let slope = -value * half * share / square;
-            let bend = slope / square * (half * (T::one() - T::real(2.0) * share) - T::one());
+            let nearness = T::one() / square;
+            let slope = -value * half * share * nearness;
+            let bend = slope * nearness * (half * (T::one() - T::real(2.0) * share) - T::one());
             Probability { value, slope, bend }
         }
         Detection::Energy { samples, signal, noise, log_threshold, path_loss } => {

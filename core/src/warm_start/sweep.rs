@@ -285,8 +285,7 @@ impl Sweep<'_> {
         let before = cost.get(from..from + length).unwrap_or_default();
         let next = next.get_mut(first..first + length).unwrap_or_default();
         let parents = parents.get_mut(first..first + length).unwrap_or_default();
-        let count = f32::from_count(step.between().count() + 1);
-        let weight = *interval / count;
+        let weight = *interval * step.share();
         // One loop a step, and no choice in any: the compiler makes each one of vectors.
         let mut totals = [0.0; CHUNK];
         for ((total, &near), &far) in totals.iter_mut().zip(row(first)).zip(row(from)) {
