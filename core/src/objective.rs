@@ -83,7 +83,7 @@ use core::ops::AddAssign;
 use heapless::Vec;
 
 use crate::math::{Point, Real};
-use crate::metrics::{Adjoint, Needs, Sample, Situation, Values, backward, figures, forward};
+use crate::metrics::{Adjoint, Digits, Needs, Sample, Situation, Values, backward, figures, forward};
 use crate::model::jamming::Emitter;
 use crate::scenario::{Betrayal, Reduce, ReferencePoint, View};
 use crate::trajectory::Trajectory;
@@ -132,7 +132,7 @@ pub(crate) fn needed_values<T: Real, const DIM: usize, const NODES: usize, const
     };
     let mut emitters = Emitters::<T, DIM, AGENTS>::new();
     lay_emitters(scenario, trajectory, node, &mut emitters);
-    figures(scenario, &situation, &emitters, needs, scratch)
+    figures(scenario, &situation, &emitters, (needs, Digits::All), scratch)
 }
 
 /// All figures of an agent that stands at `position` (length units) at `time` (s): no jamming, no dropout, and
@@ -152,7 +152,7 @@ pub fn point_values<T: Real, const DIM: usize>(
         level: zero,
         betrayal: Betrayal::None,
     };
-    figures(scenario, &situation, &[], Needs::ALL, scratch)
+    figures(scenario, &situation, &[], (Needs::ALL, Digits::All), scratch)
 }
 
 /// The objective, penalty on late arrival included.
@@ -285,7 +285,7 @@ fn survey<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize>(
             if needs.nothing() {
                 continue;
             }
-            let values = figures(scenario, &situation, &emitters, needs, scratch);
+            let values = figures(scenario, &situation, &emitters, (needs, Digits::All), scratch);
             tally.compare(scenario, agent, node, situation.time, &values);
             if which == Which::All {
                 tally.integrate(scenario, agent, situation.time, interval(trajectory, node), &values);

@@ -39,8 +39,8 @@ pub const STACK_BYTES: usize = 256 << 20;
 /// What planning uses of its stack at the most in optimised builds, and some more, bytes.
 const USED_BYTES: usize = 128 << 10;
 
-/// Has the system give the part of the stack that planning uses: it gives memory page by page as it is first touched, which
-/// takes as long as a short replan.
+/// Has the system give the part of the stack that planning uses, which it does page by page as it is first touched: a plan's time
+/// is that of planning, as with the memory of the planner.
 #[inline(never)]
 fn touch_stack() {
     std::hint::black_box(&mut [0_u8; USED_BYTES]);

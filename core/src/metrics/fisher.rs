@@ -121,7 +121,7 @@ pub(super) fn forward<T: Real, const DIM: usize>(
 /// What location errors are made of, to the digits that a lattice needs, in one pass over the sensors; `None` where there are
 /// not more ranging sensors than dimensions.
 ///
-/// Directions are taken from the first one, so that what cancels is no more than their spread about it; a pivot that is all
+/// The reference point is the position, as it is for a lattice. Directions are taken from the first one, so that what cancels is no more than their spread about it; a pivot that is all
 /// rounding is held at the floor.
 pub(super) fn rough<T: Real, const DIM: usize>(
     scenario: &View<'_, T, DIM>,
@@ -145,13 +145,7 @@ pub(super) fn rough<T: Real, const DIM: usize>(
         }
         let variance = variance.clamp_to(T::one() / T::LARGE, T::LARGE);
         let weight = T::one() / variance;
-        let direction = match situation.reference {
-            None => offset / square.sqrt(),
-            Some(reference) => {
-                let offset = reference - place;
-                offset / soft_square(&offset, softening).sqrt()
-            }
-        };
+        let direction = offset / square.sqrt();
         if count == 0 {
             from = direction;
         }

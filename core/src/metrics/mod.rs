@@ -25,7 +25,7 @@ mod sample;
 
 pub use curvature::Variables;
 pub use sample::Sample;
-pub(crate) use sample::{Outcome, Situation, backward, figures, forward, rough_figures};
+pub(crate) use sample::{Digits, Outcome, Situation, backward, figures, forward};
 
 use crate::math::Real;
 use crate::scenario::{Limit, Metric};

@@ -115,40 +115,36 @@ pub(crate) struct Outcome<T, const DIM: usize> {
     pub covariance: Option<fisher::Covariance<T, DIM>>,
 }
 
+/// How many digits location errors are to have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Digits {
+    /// All that there are.
+    All,
+    /// As many as a lattice needs; where code is to be small, all.
+    Few,
+}
+
 /// The values of [`forward`]; `samples` are of no use afterwards.
 #[inline]
 pub(crate) fn figures<T: Real, const DIM: usize>(
     scenario: &View<'_, T, DIM>,
     situation: &Situation<T, DIM>,
     emitters: &[Emitter<T, DIM>],
-    needs: Needs,
+    (needs, digits): (Needs, Digits),
     samples: &mut [Sample<T, DIM>],
 ) -> Values<T> {
-    if !needs.detection || scenario.frame.pooling != Pooling::None {
-        return forward(scenario, situation, emitters, needs, samples).values;
-    }
-    let rest = Needs { detection: false, ..needs };
-    let others =
+    let is_alone = needs.detection && scenario.frame.pooling == Pooling::None;
+    let is_rough = needs.location && digits == Digits::Few && !cfg!(feature = "compact");
+    let rest = Needs { detection: needs.detection && !is_alone, location: needs.location && !is_rough, ..needs };
+    let mut values =
         if rest.nothing() { Values::default() } else { forward(scenario, situation, emitters, rest, samples).values };
-    Values { detection: detection::value(scenario, situation, samples.len()), ..others }
-}
-
-/// The same, location errors with the digits that a lattice needs.
-#[inline]
-pub(crate) fn rough_figures<T: Real, const DIM: usize>(
-    scenario: &View<'_, T, DIM>,
-    situation: &Situation<T, DIM>,
-    emitters: &[Emitter<T, DIM>],
-    needs: Needs,
-    samples: &mut [Sample<T, DIM>],
-) -> Values<T> {
-    if !needs.location || cfg!(feature = "compact") {
-        return figures(scenario, situation, emitters, needs, samples);
+    if is_alone {
+        values.detection = detection::value(scenario, situation, samples.len());
     }
-    let rest = Needs { location: false, ..needs };
-    let others =
-        if rest.nothing() { Values::default() } else { figures(scenario, situation, emitters, rest, samples) };
-    Values { location: fisher::rough(scenario, situation, emitters, samples.len()), ..others }
+    if is_rough {
+        values.location = fisher::rough(scenario, situation, emitters, samples.len());
+    }
+    values
 }
 
 /// Figures of one agent at one node, of the kinds that `needs` names.

@@ -13,7 +13,7 @@ use heapless::Vec;
 
 use crate::constraints::region::horizontal;
 use crate::math::{Point, Real};
-use crate::metrics::{Needs, Sample, Situation, Values, rough_figures};
+use crate::metrics::{Digits, Needs, Sample, Situation, Values, figures};
 use crate::model::jamming::Emitter;
 use crate::objective::needed_values;
 use crate::scenario::{
@@ -315,7 +315,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         }
         let betrayal = self.agent.jammer.map_or(Betrayal::None, |jammer| jammer.betrayal);
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-        let values = rough_figures(self.scenario, &here, emitters, slice.own.needs, scratch);
+        let values = figures(self.scenario, &here, emitters, (slice.own.needs, Digits::Few), scratch);
         if self.scenario.limits.iter().any(|limit| is_outside(limit, &values)) {
             return T::INFINITY;
         }
@@ -344,7 +344,8 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
             let (dropout, level, betrayal) = (T::zero(), T::zero(), Betrayal::None);
             let there =
                 Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
-            rate += self.price(weights, &rough_figures(self.scenario, &there, emitters, weights.needs, scratch));
+            rate +=
+                self.price(weights, &figures(self.scenario, &there, emitters, (weights.needs, Digits::Few), scratch));
         }
         rate
     }
@@ -396,7 +397,7 @@ impl<'a, T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Fie
         let (dropout, level) = (T::zero(), T::zero());
         let here = Situation { time: slice.time, position: *position, reference: None, dropout, level, betrayal };
         let needs = Needs::of_limits(self.scenario.limits);
-        let values = rough_figures(self.scenario, &here, &slice.emitters, needs, scratch);
+        let values = figures(self.scenario, &here, &slice.emitters, (needs, Digits::Few), scratch);
         let found = self.scenario.limits.iter().position(|limit| is_outside(limit, &values));
         found.map(Blocked::Limit)
     }

@@ -174,8 +174,6 @@ pub(super) struct Move {
     between: u8,
 }
 
-/// One over the cells that a move looks at, its ends for half a cell each, by how many are between.
-const SHARES: [f32; BETWEEN_MAX + 1] = [1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0];
 const STAY: Move = Move { offset: [0; DIM_MAX], jump: 0, back: [0; BETWEEN_MAX], between: 0 };
 
 /// All moves within reach, the shortest first.
@@ -282,11 +280,6 @@ impl Move {
     /// Cells by axis.
     pub(super) fn offset(&self) -> &[i8; DIM_MAX] {
         &self.offset
-    }
-
-    /// Part of its cost that a cell between its ends brings.
-    pub(super) fn share(&self) -> f32 {
-        SHARES.get(usize::from(self.between)).copied().unwrap_or(1.0)
     }
 
     /// Changes of the cell's number back from the end to each of the cells between.

@@ -210,7 +210,7 @@ impl<const DIM: usize> Patch<DIM> {
 
     /// The cells of a row that are in it, from the first coordinate to the one after the last.
     fn range(&self, row: usize) -> [usize; 2] {
-        let known = self.rows.get(row.wrapping_sub(self.first)).filter(|_| ROWS_MAX > 0);
+        let known = self.rows.get(row.wrapping_sub(self.first));
         known.map_or(self.block.across(), |range| range.map(usize::from))
     }
 }
@@ -249,6 +249,7 @@ impl Sweep<'_> {
         for (number, step) in (0..=u8::MAX).zip(moves) {
             let moved = alive.block.moved(step, counts).and_then(|moved| moved.meet(&wanted.block));
             let Some(to) = moved else { continue };
+            let weight = self.interval / f32::from_count(step.between().count() + 1);
             let (aside, ahead) = if ROWS_MAX > 0 { step.by_rows(across) } else { (0, 0) };
             for row in to.rows(counts) {
                 let [mut low, mut high] = to.across();
@@ -263,29 +264,28 @@ impl Sweep<'_> {
                 let mut left = high.saturating_sub(low);
                 while left > 0 {
                     let length = left.min(CHUNK);
-                    self.relax((number, step), cell, length, clear.as_mut());
+                    self.relax((number, step, weight), cell, length, clear.as_mut());
                     (cell, left) = (cell + length, left - length);
                 }
             }
         }
     }
 
-    /// One move to a row of cells from `first` on.
+    /// One move to a row of cells from `first` on; `weight` is what the sum of the rates on its way counts, s.
     #[inline]
     fn relax(
         &mut self,
-        (number, step): (u8, &Move),
+        (number, step, weight): (u8, &Move, f32),
         first: usize,
         length: usize,
         clear: Option<&mut impl FnMut(usize, usize) -> bool>,
     ) {
         let from = step.origin(first);
-        let Self { landscape, cost, next, parents, interval } = self;
+        let Self { landscape, cost, next, parents, .. } = self;
         let row = |at: usize| landscape.get(at..at + length).unwrap_or_default();
         let before = cost.get(from..from + length).unwrap_or_default();
         let next = next.get_mut(first..first + length).unwrap_or_default();
         let parents = parents.get_mut(first..first + length).unwrap_or_default();
-        let weight = *interval * step.share();
         // One loop a step, and no choice in any: the compiler makes each one of vectors.
         let mut totals = [0.0; CHUNK];
         for ((total, &near), &far) in totals.iter_mut().zip(row(first)).zip(row(from)) {
@@ -331,5 +331,39 @@ impl<T: Real, const DIM: usize> Grid<T, DIM> {
             high: self.coordinates(self.cell(&(position + reach))),
         };
         block.meet(&Block::whole(&self.counts))
+    }
+}
+
+// Where code is to be small, a patch is its whole block.
+#[cfg(all(test, not(feature = "compact")))]
+mod tests {
+    use super::*;
+    use crate::scenario::Domain;
+
+    /// Every cell of the block whose centre is in the lens, and none that is off it by more than its edge.
+    fn holds_what_its_lens_holds<const DIM: usize>(goal: Point<f64, DIM>, radii: [f64; 2]) {
+        let start = Point::<f64, DIM>::repeat(1.0);
+        let domain = Domain { min: Point::zeros(), max: Point::repeat(10.0) };
+        let grid = Grid::new(&domain, (&start, &goal), 16.0, 600);
+        let lens = |more: f64| Lens([(start, radii[0] + more), (goal, radii[1] + more)]);
+        let block = grid.around(&goal, radii[1]).expect("the goal is in the grid");
+        let patch = Patch::of(&grid, block, || lens(0.0));
+        let edge = 2.0 * f64::from(EDGE) * grid.size();
+        let (mut inside, mut outside) = (0, 0);
+        for (cell, (at, center)) in grid.iter().enumerate() {
+            let [low, high] = patch.range(row_of(&at, &grid.counts));
+            let is_in = block.holds(&at) && (low..high).contains(&(cell % grid.counts[0]));
+            assert!(is_in || !block.holds(&at) || !lens(0.0).holds(&center), "{at:?} is left out");
+            assert!(!is_in || lens(edge).holds(&center), "{at:?} is not in the lens");
+            (inside, outside) = (inside + usize::from(is_in), outside + usize::from(block.holds(&at) && !is_in));
+        }
+        assert!(inside > 10 && outside > 10, "{inside} of {}", inside + outside);
+    }
+
+    #[test]
+    fn a_patch_is_a_lens() {
+        holds_what_its_lens_holds(Point::<f64, 2>::new(9.0, 8.0), [7.0, 5.0]);
+        holds_what_its_lens_holds(Point::<f64, 2>::new(9.0, 1.0), [4.0, 5.5]);
+        holds_what_its_lens_holds(Point::<f64, 3>::new(9.0, 8.0, 3.0), [7.0, 6.0]);
     }
 }

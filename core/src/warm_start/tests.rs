@@ -1,7 +1,9 @@
 use super::*;
+use crate::metrics::{Digits, Needs, Situation, figures};
+use crate::model::jamming::Emitter;
 use crate::scenario::{
-    Agent, AgentSet, Detection, Domain, Draft, Knot, Limit, Metric, Motion, Pooling, Ranging, ReferencePoint, Region,
-    Scenario, Sense, Sensor, Shape, Side, Susceptibility, Term, Timing, Window,
+    Agent, AgentSet, BeamPattern, Betrayal, Detection, Domain, Draft, Jammer, Knot, Limit, Metric, Motion, Pooling,
+    Ranging, ReferencePoint, Region, Scenario, Sense, Sensor, Shape, Side, Susceptibility, Term, Timing, Window,
 };
 use std::boxed::Box;
 use std::vec::Vec as List;
@@ -25,6 +27,54 @@ fn sensor(motion: Motion<'_, f64, 2>) -> Sensor<'_, f64, 2> {
 fn region(x: f64, y: f64, radius: f64) -> Region<f64> {
     let shape = Shape::Circle { center: Place::new(x, y), radius };
     Region { shape, side: Side::Outside, window: Window::always() }
+}
+
+/// From (1, 5) to (9, 5) at speed 0.1.
+fn agent() -> Agent<f64, 2> {
+    Agent {
+        start: Place::new(1.0, 5.0),
+        goal: Place::new(9.0, 5.0),
+        start_velocity: None,
+        speed_max: 0.1,
+        accel_max: 0.02,
+        weight: 1.0,
+        jammer: None,
+        dropout: None,
+    }
+}
+
+fn term(reduce: Reduce) -> Term<f64> {
+    Term {
+        metric: Metric::Detection,
+        sense: Sense::Minimize,
+        reduce,
+        weight: 1.0,
+        agents: AgentSet::ALL,
+        window: Window::always(),
+    }
+}
+
+/// A square of 10.
+fn draft<'a>(
+    agents: &'a [Agent<f64, 2>],
+    sensors: &'a [Sensor<'a, f64, 2>],
+    terms: &'a [Term<f64>],
+) -> Draft<'a, f64, 2> {
+    Draft {
+        softening: 0.05,
+        reference_point: ReferencePoint::Current,
+        pooling: Pooling::None,
+        intervals: 40,
+        start_time: 0.0,
+        time: Timing { max: 400.0, target: 400.0, penalty: 0.0 },
+        domain: Domain { min: Place::new(0.0, 0.0), max: Place::new(10.0, 10.0) },
+        agents,
+        sensors,
+        terms,
+        separation: None,
+        regions: &[],
+        limits: &[],
+    }
 }
 
 /// From (1, 5) to (9, 5) in a square of 10 at speed 0.1, in `duration` seconds.
@@ -57,40 +107,9 @@ fn search_with(
     (regions, limits): (&[Region<f64>], &[Limit<f64>]),
     reduce: Reduce,
 ) -> (Path, Result<Routes<f64, 2>, Obstruction<f64, 2>>) {
-    let agent = Agent {
-        start: Place::new(1.0, 5.0),
-        goal: Place::new(9.0, 5.0),
-        start_velocity: None,
-        speed_max: 0.1,
-        accel_max: 0.02,
-        weight: 1.0,
-        jammer: None,
-        dropout: None,
-    };
-    let term = Term {
-        metric: Metric::Detection,
-        sense: Sense::Minimize,
-        reduce,
-        weight: 1.0,
-        agents: AgentSet::ALL,
-        window: Window::always(),
-    };
-    let scenario = Scenario::<f64, 2, 32, 1, 8>::new(&Draft {
-        softening: 0.05,
-        reference_point: ReferencePoint::Current,
-        pooling: Pooling::None,
-        intervals: 40,
-        start_time: 0.0,
-        time: Timing { max: 400.0, target: 400.0, penalty: 0.0 },
-        domain: Domain { min: Place::new(0.0, 0.0), max: Place::new(10.0, 10.0) },
-        agents: &[agent],
-        sensors,
-        terms: &[term],
-        separation: None,
-        regions,
-        limits,
-    })
-    .unwrap();
+    let (agents, terms) = ([agent()], [term(reduce)]);
+    let draft = Draft { regions, limits, ..draft(&agents, sensors, &terms) };
+    let scenario = Scenario::<f64, 2, 32, 1, 8>::new(&draft).unwrap();
     let view = scenario.view();
     let mut path = Path::straight(&view, variant.duration).unwrap();
     let mut landscape = Box::new(Landscape::EMPTY);
@@ -365,5 +384,38 @@ fn a_sweep_takes_the_least_of_all_moves() {
         });
         let least = least.fold(f32::INFINITY, f32::min);
         assert!((next[to] - least).abs() < 1e-6, "{to}: {} for {least}", next[to]);
+    }
+}
+
+/// Location errors of a lattice are those of a plan, to more digits than it stores, with jamming and silence; without enough
+/// sensors there are none.
+#[test]
+fn a_lattice_knows_location_errors() {
+    let jam = Susceptibility { error_gain: 3.0, error_exponent: 2.0, ..JAM };
+    let places = [(1.0, 2.0), (4.0, 7.0), (6.0, 3.0), (8.0, 8.0), (9.0, 1.0)];
+    let sensors = places.map(|(x, y)| Sensor { jam, ..sensor(Motion::Fixed(Place::new(x, y))) });
+    let (agents, terms) = ([agent()], [term(Reduce::Integral)]);
+    let known = |count: usize| Scenario::<f64, 2, 32, 1, 8>::new(&draft(&agents, &sensors[..count], &terms)).unwrap();
+    let (scenario, few_sensors) = (known(5), known(2));
+    let jammer = Jammer { pattern: BeamPattern::Isotropic, budget: 10.0, betrayal: Betrayal::None };
+    let emitters = [Emitter::new(0, &jammer, Place::new(5.0, 5.0), 0.7, 0.0)];
+    let mut scratch = [Sample::default(); 32];
+    let mut located = |scenario: &Scenario<_, 2, 32, 1, 8>, emitters: &[_], (position, dropout), digits| {
+        let (reference, betrayal) = (None, Betrayal::None);
+        let here = Situation { time: 0.0, position, reference, dropout, level: 0.0, betrayal };
+        let needs = Needs { location: true, ..Needs::default() };
+        figures(&scenario.view(), &here, emitters, (needs, digits), &mut scratch).location
+    };
+    for (x, y, dropout) in [(5.0, 5.0, 0.0), (0.5, 9.5, 0.5), (4.0, 7.01, 0.9), (9.5, 0.2, 0.0)] {
+        let at = (Place::new(x, y), dropout);
+        for emitters in [&emitters[..], &[]] {
+            let all = located(&scenario, emitters, at, Digits::All).expect("enough sensors");
+            let few = located(&scenario, emitters, at, Digits::Few).expect("enough sensors");
+            let pairs = [(all.trace, few.trace), (all.ln_det, few.ln_det), (all.variance_sum, few.variance_sum)];
+            for (all, few) in pairs {
+                assert!((all - few).abs() < 1e-8 * all.abs().max(1.0), "({x}, {y}): {few} for {all}");
+            }
+        }
+        assert!(located(&few_sensors, &[], at, Digits::Few).is_none());
     }
 }

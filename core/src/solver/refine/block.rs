@@ -33,15 +33,16 @@ impl<T: Real, const DIM: usize> BlockRow<T, DIM> {
 /// The factor of a positive definite block: a unit lower triangle, with one over the pivots on its diagonal; `None` if it is
 /// not.
 fn triangle<T: Real, const DIM: usize>(block: &Block<T, DIM>, floor: T) -> Option<Block<T, DIM>> {
-    let (mut lower, mut scaled) = (Block::<T, DIM>::zeros(), Block::<T, DIM>::zeros());
+    // Entries of the triangle, and the same times their pivots.
+    let (mut lower, mut whole) = (Block::<T, DIM>::zeros(), Block::<T, DIM>::zeros());
     for row in 0..DIM {
         let mut pivot = block[(row, row)];
         for column in 0..row {
             let mut entry = block[(row, column)];
             for k in 0..column {
-                entry -= scaled[(row, k)] * lower[(column, k)];
+                entry -= whole[(row, k)] * lower[(column, k)];
             }
-            scaled[(row, column)] = entry;
+            whole[(row, column)] = entry;
             lower[(row, column)] = entry * lower[(column, column)];
             pivot -= entry * lower[(row, column)];
         }

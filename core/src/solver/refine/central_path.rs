@@ -12,6 +12,7 @@ use super::super::controls::{Bound, Kind};
 use super::super::coordinates::{Frame, Iterate};
 use super::super::feasible::largest_share;
 use super::super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours, race};
+use super::barrier::Range;
 use super::extremes::Extremes;
 use super::newton::{Move, Solved};
 use super::system::EXTREMES;
@@ -78,7 +79,7 @@ pub(super) struct CentralPath<'a, T, const DIM: usize, const AGENTS: usize> {
     /// Of the smallest and of the largest pace.
     pub(super) pace_multipliers: [T; 2],
     /// Multipliers are taken within this factor of mu / g: 1 at first, which is what they begin as.
-    pub(super) range: T,
+    pub(super) range: Range<T>,
     pub(super) shift: T,
     pub(super) times: Times,
 }
@@ -131,7 +132,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) -> Followed {
-        self.range = T::one();
+        self.range = Range::of(T::one());
         self.frame.expand(&workspace.iterate, &mut workspace.trial);
         self.weigh(workspace);
         ledger.evaluations += 1;
@@ -163,8 +164,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             }
             let rival = ledger.rival.filter(|_| step >= JOIN_AFTER && !cfg!(feature = "compact"));
             if let Some(rival) = rival
-                && (race::has_joined(self.scenario, &workspace.trial, &workspace.champion)
-                    || share > T::real(0.5) && self.barrier < first && self.promise(&newton) > rival)
+                && (share > T::real(0.5) && self.barrier < first && self.promise(&newton) > rival
+                    || race::has_joined(self.scenario, &workspace.trial, &workspace.champion))
             {
                 return Followed::To(Status::IterationLimit);
             }
@@ -417,7 +418,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
                 self.is_spent = merit - value <= rounding;
                 self.keep_if_best(workspace, ledger);
                 self.move_multipliers(share, workspace);
-                self.range = T::real(CENTRAL_RANGE);
+                self.range = Range::of(T::real(CENTRAL_RANGE));
                 workspace.iterate.assign(&workspace.next, self.frame);
                 self.extremes = extremes;
                 return Some(share);

@@ -39,7 +39,7 @@ use crate::scenario::{Reduce, TERMS_MAX, Term, View};
 use super::controls::Bound;
 use super::coordinates::Frame;
 use super::{Ledger, Settings, Status, Times, Workspace, guard, neighbours};
-use barrier::Multipliers;
+use barrier::{Multipliers, Range};
 use central_path::CentralPath;
 use extremes::Extremes;
 use system::System;
@@ -118,7 +118,7 @@ where
         barrier: if is_inside { ledger.barrier.min(first) } else { first },
         barrier_last: T::real(LAST_BARRIER).max(T::EPSILON) * scale,
         pace_multipliers: [T::zero(); 2],
-        range: T::one(),
+        range: Range::of(T::one()),
         shift: T::zero(),
         times: ledger.times,
     };

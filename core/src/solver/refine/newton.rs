@@ -69,9 +69,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
         for (multiplier, slack) in
             self.pace_multipliers.iter_mut().zip(self.frame.pace_slacks(workspace.iterate.pace))
         {
-            *multiplier = slack.map_or(T::zero(), |slack| {
-                barrier::held(*multiplier, self.barrier / slack, barrier::Range::of(self.range))
-            });
+            *multiplier =
+                slack.map_or(T::zero(), |slack| barrier::held(*multiplier, self.barrier / slack, self.range));
         }
         let pace_equation = self.pace_equation(workspace);
         let smallest = T::real(1e-6) * (T::one() + self.barrier);
@@ -145,7 +144,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> CentralPath<'_, T, DIM, AGE
             trajectory,
             extremes: &self.extremes,
             barrier: self.barrier,
-            range: barrier::Range::of(self.range),
+            range: self.range,
         }
     }
 
