@@ -28,6 +28,7 @@ mod central_path;
 mod extremes;
 mod limits;
 mod newton;
+mod place;
 mod rows;
 mod system;
 
