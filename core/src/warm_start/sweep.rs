@@ -19,8 +19,10 @@ use super::grid::{Grid, Move};
 
 /// Cells that are done together.
 const CHUNK: usize = 32;
+/// Whether patches are smaller than their blocks; where code is to be small they are not.
+const HAS_ROWS: bool = !cfg!(feature = "compact");
 /// Rows of a patch that know where they begin and end.
-const ROWS_MAX: usize = if cfg!(feature = "compact") { 0 } else { 192 };
+const ROWS_MAX: usize = if HAS_ROWS { 192 } else { 0 };
 /// Sides of a cell by which a cell that a move looks at may be off its line: half a diagonal, and rounding.
 const ASTRAY: f64 = 1.0;
 /// Part of a cell by which a patch is larger than its lens, for rounding.
@@ -174,7 +176,7 @@ impl<const DIM: usize> Patch<DIM> {
 
     /// What of a block is in a lens, and of its edge a little more.
     pub(super) fn of<T: Real>(grid: &Grid<T, DIM>, block: Block<DIM>, lens: impl FnOnce() -> Lens<T, DIM>) -> Self {
-        if ROWS_MAX == 0 {
+        if !HAS_ROWS {
             return Self::whole(block);
         }
         let lens = lens();
@@ -250,10 +252,10 @@ impl Sweep<'_> {
             let moved = alive.block.moved(step, counts).and_then(|moved| moved.meet(&wanted.block));
             let Some(to) = moved else { continue };
             let weight = self.interval / f32::from_count(step.between().count() + 1);
-            let (aside, ahead) = if ROWS_MAX > 0 { step.by_rows(across) } else { (0, 0) };
+            let (aside, ahead) = if HAS_ROWS { step.by_rows(across) } else { (0, 0) };
             for row in to.rows(counts) {
                 let [mut low, mut high] = to.across();
-                if ROWS_MAX > 0 {
+                if HAS_ROWS {
                     let from = alive.range(row.wrapping_add_signed(-aside));
                     let from = from.map(|cell| cell.saturating_add_signed(ahead));
                     for [begin, end] in [wanted.range(row), from] {
