@@ -29,6 +29,8 @@ const SHARPNESS: [f64; 4] = [10.0, 50.0, 250.0, 1250.0];
 pub(super) const STAGES_MAX: usize = SHARPNESS.len();
 /// Weight of the barriers by stage, over the objective.
 const BARRIER: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
+/// Iterations by which [`clear`] goes on from where regions and limits are left.
+const AWAY: usize = 3;
 /// Slack of regions and limits that a restored start has.
 const CLEAR: f64 = 1e-2;
 /// Slack with which a start is not restored.
@@ -60,19 +62,55 @@ where
     T: Real,
 {
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
-    frame.collapse(&workspace.best, &mut workspace.iterate);
-    workspace.trial.assign(&workspace.best);
-    workspace.by_trajectory.assign(&workspace.best);
-    workspace.anchor.assign(&workspace.iterate, &frame);
-    lay_anchor(scenario, &frame, &mut workspace.anchor);
-    workspace.projection.prepare(&frame);
-    ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
-    ledger.evaluations += 1;
+    begin(scenario, &frame, workspace, ledger);
     if !ledger.best.finite() {
         return Status::NonFinite;
     }
     let before = ledger.iterations;
     Stages { scenario, settings, frame: &frame, before }.run(workspace, ledger, deadline)
+}
+
+/// Leads `workspace.best`, which must be feasible but for regions and limits, clear of these, and [`AWAY`] iterations away from
+/// them, where a refinement can begin; whether it is clear then.
+pub(super) fn clear<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    settings: &Settings<T>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+    deadline: &mut dyn FnMut() -> bool,
+) -> bool
+where
+    T: Real,
+{
+    let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
+    begin(scenario, &frame, workspace, ledger);
+    let before = ledger.iterations;
+    let stages = Stages { scenario, settings, frame: &frame, before };
+    if !ledger.best.finite() || stages.restore(workspace, ledger, deadline).is_some() {
+        return false;
+    }
+    let quota = (ledger.iterations + AWAY).min(before + settings.iterations);
+    stages.descent(stages.merit(Extreme::Exact, BARRIER[0], ledger), quota).run(workspace, ledger, deadline);
+    true
+}
+
+/// Takes `workspace.best` for what a descent begins with.
+fn begin<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
+    scenario: &View<'_, T, DIM>,
+    frame: &Frame<T, DIM, AGENTS>,
+    workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
+    ledger: &mut Ledger<T>,
+) where
+    T: Real,
+{
+    frame.collapse(&workspace.best, &mut workspace.iterate);
+    workspace.trial.assign(&workspace.best);
+    workspace.by_trajectory.assign(&workspace.best);
+    workspace.anchor.assign(&workspace.iterate, frame);
+    lay_anchor(scenario, frame, &mut workspace.anchor);
+    workspace.projection.prepare(frame);
+    ledger.best = objective::value(scenario, &workspace.best, Extreme::Exact, &mut workspace.scratch);
+    ledger.evaluations += 1;
 }
 
 /// The order of merits: restoration where the start is not clear of regions and limits, then barriers that soften
@@ -106,10 +144,8 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
             } else {
                 Extreme::Exact
             };
-            let scale = ledger.best.abs().max(T::one());
-            let guard = if is_guarded { Guard::Barrier { weight: T::real(weight) * scale } } else { Guard::None };
             let quota = before + self.settings.iterations * (stage + 1) / stages;
-            let merit = Merit { extreme, objective: T::one(), guard };
+            let merit = self.merit(extreme, weight, ledger);
             match self.descent(merit, quota).run(workspace, ledger, deadline) {
                 Ending::Status(ended) => status = ended,
                 Ending::Stop(ended) => return ended,
@@ -145,6 +181,13 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
         }
         // Cut off or not: what there is cannot be flown.
         Some(Status::Infeasible)
+    }
+
+    /// The objective, with a barrier of `weight` times it on regions and limits where there are any.
+    fn merit(&self, extreme: Extreme<T>, weight: f64, ledger: &Ledger<T>) -> Merit<T> {
+        let weight = T::real(weight) * ledger.best.abs().max(T::one());
+        let guard = if guard::is_needed(self.scenario) { Guard::Barrier { weight } } else { Guard::None };
+        Merit { extreme, objective: T::one(), guard }
     }
 
     fn descent(&self, merit: Merit<T>, quota: usize) -> Descent<'_, T, DIM, AGENTS> {

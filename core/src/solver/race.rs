@@ -14,7 +14,7 @@ use crate::warm_start::{self, LARGE_TEAM, Level, Prices};
 
 use super::global::project;
 use super::sides::Sides;
-use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbours, refine};
+use super::{Ledger, Settings, Status, Times, Workspace, guard, improve, neighbours, projected_gradient, refine};
 
 /// Projected-gradient iterations of one candidate.
 pub(super) const POLISH_ITERATIONS: usize = 12;
@@ -489,7 +489,7 @@ pub(super) fn equip<T: Real, const DIM: usize, const NODES: usize, const SENSORS
 }
 
 /// Improves `workspace.best`, whose objective is `ledger.best`: by the refinement where it may take the steps that it needs
-/// from a lattice path, and led by the projected gradient otherwise.
+/// from a lattice path, once that is clear of regions and limits, and led by the projected gradient otherwise.
 pub(super) fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
@@ -500,11 +500,18 @@ pub(super) fn polish<T, const DIM: usize, const NODES: usize, const SENSORS: usi
 where
     T: Real,
 {
-    if settings.refinements >= POLISH_REFINEMENTS
-        && !cfg!(feature = "first-order")
-        && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
-    {
-        return status;
+    if settings.refinements >= POLISH_REFINEMENTS && !cfg!(feature = "first-order") {
+        if let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline) {
+            return status;
+        }
+        // What keeps the refinement from beginning, as a rule, are regions and limits alone.
+        if guard::is_needed(scenario)
+            && !cfg!(feature = "compact")
+            && projected_gradient::clear(scenario, settings, workspace, ledger, deadline)
+            && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
+        {
+            return status;
+        }
     }
     improve(scenario, settings, workspace, ledger, deadline)
 }
