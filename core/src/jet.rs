@@ -25,12 +25,18 @@ pub struct Jet<T, const M: usize> {
     pub hessian: [[T; M]; M],
 }
 
-/// A vector that is linear in the variables.
+/// How a vector depends on the variables, which it is linear in: some of them are its components, and one is the time in which
+/// it moves.
+///
+/// It is laid once a node, for all sensors: arrays that are filled by index stay in memory, and are waited for when they are read.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Line<T, const DIM: usize, const M: usize> {
-    pub value: Point<T, DIM>,
-    /// Its derivative by each variable.
-    pub columns: [Point<T, DIM>; M],
+pub(crate) struct Axes<T, const DIM: usize, const M: usize> {
+    /// Derivative by each variable, at rest.
+    columns: [Point<T, DIM>; M],
+    /// Second derivatives of the square, at rest; upper triangle.
+    twice: [[T; M]; M],
+    /// Which variable is the time, where one is.
+    time: Option<[T; M]>,
 }
 
 /// First and second derivatives of a function of two numbers.
@@ -114,6 +120,22 @@ impl<T: Real, const M: usize> Jet<T, M> {
         jet
     }
 
+    /// `self` times a number that is linear in one variable: `other` in value, `slope` times `unit` in gradient.
+    #[inline(always)]
+    #[must_use]
+    #[expect(clippy::needless_range_loop, reason = "rows and columns by the letters of the equations")]
+    pub(crate) fn times_linear(&self, other: T, slope: T, unit: &[T; M]) -> Self {
+        let mut jet = Self::constant(self.value * other);
+        for a in 0..M {
+            jet.gradient[a] = other * self.gradient[a] + self.value * slope * unit[a];
+            let (along, across) = (slope * self.gradient[a], slope * unit[a]);
+            for b in a..M {
+                jet.hessian[a][b] = other * self.hessian[a][b] + along * unit[b] + across * self.gradient[b];
+            }
+        }
+        jet
+    }
+
     /// `self` times a constant, plus another.
     #[inline]
     #[must_use]
@@ -165,44 +187,64 @@ impl<T: Real, const M: usize> Jet<T, M> {
     }
 }
 
-impl<T: Real, const DIM: usize, const M: usize> Line<T, DIM, M> {
-    /// A vector that depends on nothing.
-    #[inline]
-    pub(crate) fn constant(value: Point<T, DIM>) -> Self {
-        Self { value, columns: [Point::zeros(); M] }
+/// 1 at `index`, 0 elsewhere.
+#[inline(always)]
+pub(crate) fn unit<T: Real, const M: usize>(index: Option<usize>) -> [T; M] {
+    core::array::from_fn(|a| if index == Some(a) { T::one() } else { T::zero() })
+}
+
+impl<T: Real, const DIM: usize, const M: usize> Axes<T, DIM, M> {
+    /// The components are `sign` times the variables from `first` on; the time is variable number `time`.
+    #[inline(always)]
+    pub(crate) fn new(first: Option<usize>, sign: T, time: Option<usize>) -> Self {
+        let column = |a: usize| {
+            Point::from_fn(|k, _| if first.is_some_and(|first| a == first + k) { sign } else { T::zero() })
+        };
+        let columns: [Point<T, DIM>; M] = core::array::from_fn(column);
+        let mut twice = [[T::zero(); M]; M];
+        for a in 0..M {
+            twice[a][a] = T::real(2.0) * columns[a].dot(&columns[a]);
+        }
+        Self { columns, twice, time: time.filter(|&time| time < M).map(|time| unit(Some(time))) }
     }
 
-    /// Lets `sign` times the variables from `first` on be the components.
-    #[inline]
-    pub(crate) fn along_axes(mut self, first: Option<usize>, sign: T) -> Self {
-        if let Some(first) = first {
-            for (axis, column) in self.columns.iter_mut().skip(first).take(DIM).enumerate() {
-                column[axis] += sign;
+    /// Derivative by each variable, at a `velocity`.
+    #[inline(always)]
+    pub(crate) fn columns(&self, velocity: &Point<T, DIM>) -> [Point<T, DIM>; M] {
+        let mut columns = self.columns;
+        if let Some(time) = self.moving(velocity) {
+            for a in 0..M {
+                columns[a] += velocity * time[a];
             }
         }
-        self
+        columns
     }
 
-    /// Lets `direction` times a variable be added.
-    #[inline]
-    pub(crate) fn along(mut self, index: Option<usize>, direction: Point<T, DIM>) -> Self {
-        if let Some(column) = index.and_then(|index| self.columns.get_mut(index)) {
-            *column += direction;
-        }
-        self
-    }
-
-    /// Sum of the squares of the components; `value` is that sum where it is known, softening included.
-    #[inline]
-    pub(crate) fn square(&self, value: T) -> Jet<T, M> {
+    /// Sum of the squares of the components of `vector`; `value` is that sum, softening included.
+    #[inline(always)]
+    pub(crate) fn square(&self, vector: &Point<T, DIM>, velocity: &Point<T, DIM>, value: T) -> Jet<T, M> {
         let two = T::real(2.0);
-        let mut jet = Jet::constant(value);
+        let mut jet = Jet { value, gradient: [T::zero(); M], hessian: self.twice };
         for a in 0..M {
-            jet.gradient[a] = two * self.columns[a].dot(&self.value);
-            for b in a..M {
-                jet.hessian[a][b] = two * self.columns[a].dot(&self.columns[b]);
+            jet.gradient[a] = two * self.columns[a].dot(vector);
+        }
+        if let Some(time) = self.moving(velocity) {
+            let (approach, bend) = (two * velocity.dot(vector), two * velocity.dot(velocity));
+            for a in 0..M {
+                jet.gradient[a] += approach * time[a];
+                let along = two * self.columns[a].dot(velocity);
+                for b in a..M {
+                    let across = two * self.columns[b].dot(velocity);
+                    jet.hessian[a][b] += along * time[b] + across * time[a] + bend * time[a] * time[b];
+                }
             }
         }
         jet
+    }
+
+    /// Which variable is the time, where that moves the vector.
+    #[inline(always)]
+    fn moving(&self, velocity: &Point<T, DIM>) -> Option<&[T; M]> {
+        self.time.as_ref().filter(|_| velocity.iter().any(|component| *component != T::zero()))
     }
 }

@@ -5,8 +5,8 @@
 //!
 //! Source: (19), (27), (54).
 
-use super::{Variables, offset};
-use crate::jet::Jet;
+use super::{Variables, axes, square};
+use crate::jet::{Jet, unit};
 use crate::math::Real;
 use crate::metrics::sample::{Sample, Situation};
 use crate::model::betrayal::betrayed_jet;
@@ -64,23 +64,27 @@ pub(super) fn detected<T: Real, const DIM: usize, const M: usize>(
     if is_common && !cfg!(feature = "compact") {
         return detected_at(scenario, situation, samples);
     }
-    let heard = Jet::variable(situation.dropout, variables.dropout).affine(-T::one(), T::one());
+    let (heard, dropout) = (T::one() - situation.dropout, unit(variables.dropout));
     let level = Jet::variable(situation.level, variables.level);
+    let axes = axes(variables);
     let mut union = Union::new();
     let pooling = &scenario.frame.pooling;
     for (sensor, sample) in scenario.sensors.iter().zip(samples) {
         let Some(model) = sensor.detection.as_ref().filter(|detection| !pooling.takes(detection)) else {
             continue;
         };
-        let square = offset(sample, variables).square(sample.square);
+        let square = square(sample, &axes);
         let Probability { value, slope, bend } = detector::detection(model, sample.square);
         let silent = square.chain(value, slope, bend);
         let loud = match situation.betrayal {
             Betrayal::None => silent,
             other => betrayed_jet(other, &sensor.jam, &silent, &level, &square),
         };
-        let share =
-            if variables.dropout.is_some() { loud.times(&heard) } else { loud.affine(heard.value, T::zero()) };
+        let share = if variables.dropout.is_some() {
+            loud.times_linear(heard, -T::one(), &dropout)
+        } else {
+            loud.affine(heard, T::zero())
+        };
         union.include(&share);
     }
     union.into_jet()
@@ -139,11 +143,12 @@ pub(super) fn alarmed<T: Real, const DIM: usize, const M: usize>(
     samples: &[Sample<T, DIM>],
     variables: &Variables,
 ) -> Jet<T, M> {
+    let axes = axes(variables);
     let mut union = Union::new();
     for (sensor, sample) in sensors.iter().zip(samples) {
         if let Some(model) = &sensor.detection {
             let Probability { value, slope, bend } = detector::false_alarm(model, sample.square);
-            union.include(&offset(sample, variables).square(sample.square).chain(value, slope, bend));
+            union.include(&square(sample, &axes).chain(value, slope, bend));
         }
     }
     union.into_jet()

@@ -25,8 +25,8 @@
 //! sensors outweigh the others by ten orders of magnitude in poor geometry; two or three digits may be all that is left
 //! of the smaller second derivatives then (`core/tests/model_curvature.rs` counts them).
 
-use super::{Focus, Variables, moved, offset};
-use crate::jet::{Jet, Line};
+use super::{Focus, Variables, axes, square};
+use crate::jet::{Axes, Jet, unit};
 use crate::math::{Point, Real};
 use crate::metrics::LocationAdjoint;
 use crate::metrics::fisher::Covariance;
@@ -74,6 +74,37 @@ pub(crate) struct Around<'a, T, const DIM: usize> {
     pub focus: &'a Focus,
 }
 
+/// How what a sensor sees depends on the variables.
+struct Dependence<T, const DIM: usize, const M: usize> {
+    /// Agent less sensor.
+    offset: Axes<T, DIM, M>,
+    /// Reference point less sensor; `None` where it does not vary.
+    reference: Option<Axes<T, DIM, M>>,
+    dropout: [T; M],
+    /// Sensor less emitter, level and azimuth: of the emitter whose emission varies, and of others.
+    emission: [Emission<T, DIM, M>; 2],
+}
+
+impl<T: Real, const DIM: usize, const M: usize> Dependence<T, DIM, M> {
+    #[inline(always)]
+    fn new(around: &Around<'_, T, DIM>) -> Self {
+        let Focus { direct, emission, .. } = around.focus;
+        let first = if around.situation.reference.is_some() { direct.reference } else { direct.position };
+        let varies = first.is_some() || direct.time.is_some();
+        let emission = [*emission, emission.shared()].map(|parts| Emission {
+            axes: Axes::new(parts.position, -T::one(), parts.time),
+            level: unit(parts.level),
+            azimuth: unit(parts.azimuth),
+        });
+        Self {
+            offset: axes(direct),
+            reference: varies.then(|| Axes::new(first, T::one(), direct.time)),
+            dropout: unit(direct.dropout),
+            emission,
+        }
+    }
+}
+
 /// Derivatives of the logarithms, second ones weighed by `adjoint`; samples must be as the way forward left them.
 #[inline(always)]
 pub(crate) fn location<T: Real, const DIM: usize, const M: usize>(
@@ -88,6 +119,7 @@ pub(crate) fn location<T: Real, const DIM: usize, const M: usize>(
     let by_trace = adjoint.ln_trace / location.trace;
     let by_sum = adjoint.ln_variance_sum / location.variance_sum;
     let kernel = Kernel::new(covariance, adjoint.ln_det, by_trace);
+    let dependence = Dependence::new(around);
     let mut sums = Sums {
         weight: zero,
         mean: [Point::zeros(); M],
@@ -101,9 +133,9 @@ pub(crate) fn location<T: Real, const DIM: usize, const M: usize>(
         {
             let pull = kernel.times(&sample.residual);
             let bent = covariance.pulled(&pull);
-            let mut sensed =
-                Sensed { ln_weight: ln_weight(sensor, model, sample, around), direction: [Point::zeros(); M] };
-            let directions = directions(covariance, sample, around, &bent, &mut sensed.direction);
+            let ln_weight = ln_weight(sensor, model, sample, (around, &dependence));
+            let mut sensed = Sensed { ln_weight, direction: [Point::zeros(); M] };
+            let directions = directions(covariance, sample, &dependence, &bent, &mut sensed.direction);
             sums.include(sample, &sensed, &directions, &kernel, &pull, by_sum);
         }
     }
@@ -145,26 +177,24 @@ fn ln_weight<T: Real, const DIM: usize, const M: usize>(
     sensor: &StoredSensor<T, DIM>,
     model: &crate::scenario::Ranging<T>,
     sample: &Sample<T, DIM>,
-    around: &Around<'_, T, DIM>,
+    (around, dependence): (&Around<'_, T, DIM>, &Dependence<T, DIM, M>),
 ) -> Jet<T, M> {
     let zero = T::zero();
     if sample.moves == zero {
         return Jet::constant(zero);
     }
-    let direct = &around.focus.direct;
-    let square: Jet<T, M> = offset(sample, direct).square(sample.square);
     let bend = ranging::bend(model, sample.square, sample.variance_slope);
-    let mut jet = square.chain(zero, -sample.variance_slope, -bend);
-    if let Some(index) = direct.dropout {
+    let mut jet = square(sample, &dependence.offset).chain(zero, -sample.variance_slope, -bend);
+    if around.focus.direct.dropout.is_some() {
         // d ln factor = s dtheta with s = 2 / (1 - theta), so that ds = s^2 / 2 dtheta.
         let (_, slope) = dropout::variance_factor(around.situation.dropout);
-        if let (Some(entry), Some(row)) = (jet.gradient.get_mut(index), jet.hessian.get_mut(index)) {
-            *entry -= slope;
-            row[index] -= T::real(0.5) * slope * slope;
+        for (a, varies) in dependence.dropout.iter().enumerate() {
+            jet.gradient[a] -= slope * *varies;
+            jet.hessian[a][a] -= T::real(0.5) * slope * slope * *varies;
         }
     }
     if !around.emitters.is_empty() && sensor.jam.error_gain != zero {
-        let jammed = jam_factor(sensor, sample, around);
+        let jammed = jam_factor(sensor, sample, (around, dependence));
         let reciprocal = T::one() / sample.jam_factor;
         jet.add(&jammed.chain(zero, reciprocal, -reciprocal.squared()), -T::one());
     }
@@ -175,20 +205,19 @@ fn ln_weight<T: Real, const DIM: usize, const M: usize>(
 fn jam_factor<T: Real, const DIM: usize, const M: usize>(
     sensor: &StoredSensor<T, DIM>,
     sample: &Sample<T, DIM>,
-    around: &Around<'_, T, DIM>,
+    (around, dependence): (&Around<'_, T, DIM>, &Dependence<T, DIM, M>),
 ) -> Jet<T, M> {
     let mut factor = Jet::constant(T::one());
+    let [of_focus, of_others] = &dependence.emission;
     for emitter in around.emitters {
         let varied = emitter.agent == around.focus.emitter;
-        let parts = if varied { around.focus.emission } else { around.focus.emission.shared() };
+        let (parts, emission) =
+            if varied { (around.focus.emission, of_focus) } else { (around.focus.emission.shared(), of_others) };
         if parts == Variables::default() || (!varied && emitter.level == T::zero()) {
             continue;
         }
-        let offset = Line::constant(sample.place - emitter.position)
-            .along_axes(parts.position, -T::one())
-            .along(parts.time, sample.velocity);
-        let emission = Emission { offset, level: parts.level, azimuth: parts.azimuth };
-        factor.add(&emitter.error_jet(&emission, &sensor.jam, around.softening), T::one());
+        let seen = (&(sample.place - emitter.position), &sample.velocity);
+        factor.add(&emitter.error_jet(emission, seen, &sensor.jam, around.softening), T::one());
     }
     factor
 }
@@ -201,25 +230,21 @@ fn jam_factor<T: Real, const DIM: usize, const M: usize>(
 fn directions<T: Real, const DIM: usize, const M: usize>(
     covariance: &Covariance<T, DIM>,
     sample: &Sample<T, DIM>,
-    around: &Around<'_, T, DIM>,
+    dependence: &Dependence<T, DIM, M>,
     pull: &Point<T, DIM>,
     first: &mut [Point<T, DIM>; M],
 ) -> [[T; M]; M] {
-    let direct = &around.focus.direct;
-    let from = if around.situation.reference.is_some() { direct.reference } else { direct.position };
     let mut second = [[T::zero(); M]; M];
-    if from.is_none() && direct.time.is_none() {
-        return second;
-    }
-    let line: Line<T, DIM, M> = moved(sample.direction, from, direct.time, sample);
+    let Some(reference) = &dependence.reference else { return second };
+    let columns = reference.columns(&-sample.velocity);
     let near = sample.nearness;
     let along_pull = sample.direction.dot(pull);
     let mut along = [T::zero(); M];
     let mut across = [T::zero(); M];
     for a in 0..M {
-        along[a] = sample.direction.dot(&line.columns[a]);
-        across[a] = pull.dot(&line.columns[a]);
-        let turned = line.columns[a] - sample.direction * along[a];
+        along[a] = sample.direction.dot(&columns[a]);
+        across[a] = pull.dot(&columns[a]);
+        let turned = columns[a] - sample.direction * along[a];
         first[a] = covariance.turned(&turned) * near;
     }
     let square = near * near;
@@ -229,8 +254,7 @@ fn directions<T: Real, const DIM: usize, const M: usize>(
         let by_across = -along[a] * square;
         let by_both = -along_pull * square;
         for b in a..M {
-            second[a][b] =
-                by_along * along[b] + by_across * across[b] + by_both * line.columns[a].dot(&line.columns[b]);
+            second[a][b] = by_along * along[b] + by_across * across[b] + by_both * columns[a].dot(&columns[b]);
         }
     }
     second

@@ -19,8 +19,8 @@ mod pooled;
 
 pub(crate) use location::{Around, LocationJets, location};
 
-use crate::jet::{Jet, Line};
-use crate::math::{Point, Real};
+use crate::jet::{Axes, Jet};
+use crate::math::Real;
 use crate::metrics::sample::{Sample, Situation};
 use crate::scenario::{Pooling, View};
 
@@ -92,22 +92,14 @@ pub(crate) fn false_alarm<T: Real, const DIM: usize, const M: usize>(
     detection::alarmed(scenario.sensors, samples, variables)
 }
 
-/// Agent less sensor, x - y_j(t).
+/// Of an agent less a sensor, x - y_j(t).
 #[inline(always)]
-fn offset<T: Real, const DIM: usize, const M: usize>(
-    sample: &Sample<T, DIM>,
-    variables: &Variables,
-) -> Line<T, DIM, M> {
-    moved(sample.offset, variables.position, variables.time, sample)
+fn axes<T: Real, const DIM: usize, const M: usize>(variables: &Variables) -> Axes<T, DIM, M> {
+    Axes::new(variables.position, T::one(), variables.time)
 }
 
-/// `value`, a point less the sensor, with the point's components from `first` on.
+/// d^2 of a sensor; `axes` are those of agent less sensor.
 #[inline(always)]
-fn moved<T: Real, const DIM: usize, const M: usize>(
-    value: Point<T, DIM>,
-    first: Option<usize>,
-    time: Option<usize>,
-    sample: &Sample<T, DIM>,
-) -> Line<T, DIM, M> {
-    Line::constant(value).along_axes(first, T::one()).along(time, -sample.velocity)
+fn square<T: Real, const DIM: usize, const M: usize>(sample: &Sample<T, DIM>, axes: &Axes<T, DIM, M>) -> Jet<T, M> {
+    axes.square(&sample.offset, &-sample.velocity, sample.square)
 }

@@ -7,8 +7,8 @@
 //! Limits: in `f64` second derivatives are within 1e-5 of their own size (`core/tests/model_curvature.rs`, N up to 400). In `f32` steps
 //! are long, and second derivatives coarse.
 
-use super::{Variables, offset};
-use crate::jet::Jet;
+use super::{Variables, axes, square};
+use crate::jet::{Axes, Jet};
 use crate::math::Real;
 use crate::metrics::pooled::{detection, false_alarm, pools};
 use crate::metrics::sample::Sample;
@@ -50,16 +50,17 @@ pub(super) fn pooled<T: Real, const DIM: usize, const M: usize>(
     variables: &Variables,
 ) -> Jet<T, M> {
     let value = figure.visit(scenario, samples);
+    let axes = axes(variables);
     let mut jet: Jet<T, M> = Jet::constant(T::zero());
     for sample in members(scenario.sensors, samples) {
-        jet.add(&offset(sample, variables).square(sample.square), figure.slope(sample));
+        jet.add(&square(sample, &axes), figure.slope(sample));
     }
     jet.value = value;
     for b in 0..M {
         // Relative to the sensor whose distance changes fastest.
         let mut pace = T::zero();
         for sample in members(scenario.sensors, samples) {
-            pace = pace.max(rate::<T, DIM, M>(sample, variables, b).abs() / sample.square);
+            pace = pace.max(rate(sample, &axes, b).abs() / sample.square);
         }
         if pace == T::zero() {
             continue;
@@ -68,13 +69,13 @@ pub(super) fn pooled<T: Real, const DIM: usize, const M: usize>(
         for (steps, weight) in DIFFERENCE {
             for sample in members(scenario.sensors, samples) {
                 let base = soft_square(&sample.offset, scenario.frame.softening);
-                sample.square = base + T::real(steps) * step * rate::<T, DIM, M>(sample, variables, b);
+                sample.square = base + T::real(steps) * step * rate(sample, &axes, b);
             }
             figure.visit(scenario, samples);
             let factor = T::real(weight) / step;
             for sample in members(scenario.sensors, samples) {
                 for a in 0..=b {
-                    jet.hessian[a][b] += factor * figure.slope(sample) * rate::<T, DIM, M>(sample, variables, a);
+                    jet.hessian[a][b] += factor * figure.slope(sample) * rate(sample, &axes, a);
                 }
             }
         }
@@ -94,7 +95,6 @@ fn members<'a, T: Real, const DIM: usize>(
 }
 
 /// q_,a = 2 (x - y) . d(x - y)/du_a.
-fn rate<T: Real, const DIM: usize, const M: usize>(sample: &Sample<T, DIM>, variables: &Variables, a: usize) -> T {
-    let line = offset::<T, DIM, M>(sample, variables);
-    line.columns.get(a).map_or(T::zero(), |column| T::real(2.0) * column.dot(&line.value))
+fn rate<T: Real, const DIM: usize, const M: usize>(sample: &Sample<T, DIM>, axes: &Axes<T, DIM, M>, a: usize) -> T {
+    square(sample, axes).gradient.get(a).copied().unwrap_or_default()
 }

@@ -59,7 +59,7 @@ fn received_jet<T: Real, const M: usize>(
     let (_, by_level, _) = received(jam, level.value, square.value);
     let slope = -half * by_level / square.value;
     let bend = -(half + T::one()) * slope / square.value;
-    square.chain(by_level, slope, bend).times(level)
+    square.chain(by_level, slope, bend).times_linear(level.value, T::one(), &level.gradient)
 }
 
 /// (p^q + z^q)^(1/q). Source: (44).
