@@ -439,10 +439,11 @@ impl Weigh<f64> for Barrier {
         needs.add(self.metric);
         needs
     }
-    fn slopes(&self, _: usize, values: &Values<f64>) -> Slopes<f64> {
+    fn add_slopes(&self, _: usize, values: &Values<f64>, slopes: &mut Slopes<f64>) {
         let slack = self.bound - values.get(self.metric).expect("a metric");
-        Slopes::from_slice(&[Slope { metric: self.metric, first: 1.0 / slack, second: 1.0 / (slack * slack) }])
-            .expect("room for one")
+        slopes
+            .push(Slope { metric: self.metric, first: 1.0 / slack, second: 1.0 / (slack * slack) })
+            .expect("room for one");
     }
 }
 

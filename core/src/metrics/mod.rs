@@ -25,7 +25,7 @@ mod sample;
 
 pub use curvature::Variables;
 pub use sample::Sample;
-pub(crate) use sample::{Digits, Outcome, Situation, backward, figures, forward};
+pub(crate) use sample::{Digits, Situation, backward, figures, forward, place};
 
 use crate::math::Real;
 use crate::scenario::{Limit, Metric};

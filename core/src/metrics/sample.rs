@@ -147,6 +147,20 @@ pub(crate) fn figures<T: Real, const DIM: usize>(
     values
 }
 
+/// Where all sensors are, and how far: what all figures begin with.
+#[inline]
+pub(crate) fn place<T: Real, const DIM: usize>(
+    scenario: &View<'_, T, DIM>,
+    situation: &Situation<T, DIM>,
+    samples: &mut [Sample<T, DIM>],
+) {
+    for (sensor, sample) in scenario.sensors.iter().zip(samples) {
+        (sample.place, sample.velocity) = scenario.sensor_state(sensor, situation.time);
+        sample.offset = situation.position - sample.place;
+        sample.square = soft_square(&sample.offset, scenario.frame.softening);
+    }
+}
+
 /// Figures of one agent at one node, of the kinds that `needs` names.
 pub(crate) fn forward<T: Real, const DIM: usize>(
     scenario: &View<'_, T, DIM>,
@@ -156,11 +170,7 @@ pub(crate) fn forward<T: Real, const DIM: usize>(
     samples: &mut [Sample<T, DIM>],
 ) -> Outcome<T, DIM> {
     let softening = scenario.frame.softening;
-    for (sensor, sample) in scenario.sensors.iter().zip(samples.iter_mut()) {
-        (sample.place, sample.velocity) = scenario.sensor_state(sensor, situation.time);
-        sample.offset = situation.position - sample.place;
-        sample.square = soft_square(&sample.offset, softening);
-    }
+    place(scenario, situation, samples);
     let mut values = Values::default();
     let pooling = &scenario.frame.pooling;
     let mut pool = None;

@@ -30,7 +30,7 @@ use super::{Emitters, Extreme, lay_emitters, situation, survey};
 use crate::jet::Jet;
 use crate::math::Real;
 use crate::metrics::curvature::{Around, Focus, LocationJets, detection, false_alarm, location};
-use crate::metrics::{Adjoint, Needs, Outcome, Sample, Situation, Values, forward};
+use crate::metrics::{Adjoint, Needs, Sample, Situation, Values, forward, place};
 use crate::model::jamming::Emitter;
 use crate::scenario::{LIMITS_MAX, Metric, TERMS_MAX, View};
 use crate::trajectory::Trajectory;
@@ -59,8 +59,8 @@ pub trait Weigh<T> {
     /// Groups of figures of `agent` that have slopes.
     fn needs(&self, agent: usize) -> Needs;
 
-    /// Slopes at the values that the figures have; those that were not needed are zero or `None`.
-    fn slopes(&self, agent: usize, values: &Values<T>) -> Slopes<T>;
+    /// Adds the slopes at the values that the figures have; those that were not needed are zero or `None`.
+    fn add_slopes(&self, agent: usize, values: &Values<T>, slopes: &mut Slopes<T>);
 }
 
 /// One metric of one agent, as it is.
@@ -81,12 +81,10 @@ impl<T: Real> Weigh<T> for Single {
         needs
     }
 
-    fn slopes(&self, agent: usize, _: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
+    fn add_slopes(&self, agent: usize, _: &Values<T>, slopes: &mut Slopes<T>) {
         if agent == self.agent {
             let _ = slopes.push(Slope { metric: self.metric, first: T::one(), second: T::zero() });
         }
-        slopes
     }
 }
 
@@ -106,10 +104,8 @@ impl<T: Real, const DIM: usize> Weigh<T> for Integrals<'_, T, DIM> {
     }
 
     #[inline]
-    fn slopes(&self, agent: usize, _: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
-        tally::integral_slopes(self.scenario, agent, self.time, T::one(), &mut slopes);
-        slopes
+    fn add_slopes(&self, agent: usize, _: &Values<T>, slopes: &mut Slopes<T>) {
+        tally::integral_slopes(self.scenario, agent, self.time, T::one(), slopes);
     }
 }
 
@@ -155,11 +151,9 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Weigh<T> for Weighted<'_, T
     }
 
     #[inline]
-    fn slopes(&self, agent: usize, values: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
-        tally::integral_slopes(self.scenario, agent, self.time, self.interval, &mut slopes);
-        self.extremes.0.extreme_slopes(self.scenario, agent, self.node, self.time, values, &mut slopes);
-        slopes
+    fn add_slopes(&self, agent: usize, values: &Values<T>, slopes: &mut Slopes<T>) {
+        tally::integral_slopes(self.scenario, agent, self.time, self.interval, slopes);
+        self.extremes.0.extreme_slopes(self.scenario, agent, self.node, self.time, values, slopes);
     }
 }
 
@@ -202,15 +196,16 @@ where
             continue;
         };
         let part = Part { scenario, situation: &situation, emitters: &emitters, focus: &focus, needs };
-        let slopes = |values: &Values<T>| weigh.slopes(other, values);
+        let slopes = |values: &Values<T>, slopes: &mut Slopes<T>| weigh.add_slopes(other, values, slopes);
         // The common case with the layout known when it is compiled.
         let is_common = focus.direct == Variables::POSITION && emitters.is_empty();
-        if is_common && !cfg!(feature = "compact") {
+        let own = if is_common && !cfg!(feature = "compact") {
             let focus = Focus { direct: Variables::POSITION, emitter: 0, emission: Variables::POSITION };
-            Part { focus: &focus, emitters: &[], ..part }.add(&mut sum, slopes, scratch);
+            Part { focus: &focus, emitters: &[], ..part }.jet(slopes, scratch)
         } else {
-            part.add_any(&mut sum, &slopes, scratch);
-        }
+            part.any_jet(&slopes, scratch)
+        };
+        sum.add(&own, T::one());
     }
     sum.mirrored()
 }
@@ -227,25 +222,31 @@ struct Part<'a, T, const DIM: usize> {
 impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
     /// Compiled once, whatever the slopes.
     #[inline(never)]
-    fn add_any<const M: usize>(
+    fn any_jet<const M: usize>(
         &self,
-        sum: &mut Jet<T, M>,
-        slopes: &dyn Fn(&Values<T>) -> Slopes<T>,
+        slopes: &dyn Fn(&Values<T>, &mut Slopes<T>),
         scratch: &mut [Sample<T, DIM>],
-    ) {
-        self.add(sum, slopes, scratch);
+    ) -> Jet<T, M> {
+        self.jet(slopes, scratch)
     }
 
     #[inline(always)]
-    fn add<const M: usize>(
+    fn jet<const M: usize>(
         &self,
-        sum: &mut Jet<T, M>,
-        slopes: impl Fn(&Values<T>) -> Slopes<T>,
+        add_slopes: impl Fn(&Values<T>, &mut Slopes<T>),
         scratch: &mut [Sample<T, DIM>],
-    ) {
+    ) -> Jet<T, M> {
         let Self { scenario, situation, emitters, focus, needs } = *self;
-        let only = Needs { location: needs.location, ..Needs::default() };
-        let Outcome { mut values, covariance, .. } = forward(scenario, situation, emitters, only, scratch);
+        let outcome;
+        let (mut values, covariance) = if needs.location {
+            let only = Needs { location: true, ..Needs::default() };
+            outcome = forward(scenario, situation, emitters, only, scratch);
+            (outcome.values, outcome.covariance.as_ref())
+        } else {
+            place(scenario, situation, scratch);
+            (Values::default(), None)
+        };
+        let mut sum = Jet::constant(T::zero());
         let nothing = Jet::constant(T::zero());
         let (mut detected, mut alarmed) = (nothing, nothing);
         if needs.detection {
@@ -256,14 +257,15 @@ impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
             alarmed = false_alarm(scenario, scratch, &focus.direct);
             values.false_alarm = alarmed.value;
         }
-        let slopes = slopes(&values);
+        let mut slopes = Slopes::new();
+        add_slopes(&values, &mut slopes);
         let mut adjoint = Adjoint::default();
         for slope in &slopes {
             adjoint.add(slope.metric, slope.first, &values);
         }
         sum.add(&detected, adjoint.detection);
         sum.add(&alarmed, adjoint.false_alarm);
-        let located = covariance.as_ref().map(|covariance| {
+        let located = covariance.map(|covariance| {
             let around = Around { situation, emitters, softening: scenario.frame.softening, focus };
             location(covariance, &around, scenario.sensors, scratch, &adjoint.location)
         });
@@ -279,9 +281,10 @@ impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
                 (Metric::Detection, _) => sum.add_square(&detected.gradient, slope.second),
                 (Metric::FalseAlarm, _) => sum.add_square(&alarmed.gradient, slope.second),
                 (_, None) => {}
-                (metric, Some(located)) => add_location(sum, metric, slope, &values, located),
+                (metric, Some(located)) => add_location(&mut sum, metric, slope, &values, located),
             }
         }
+        sum
     }
 }
 

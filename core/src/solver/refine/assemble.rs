@@ -216,7 +216,12 @@ impl<T: Real, const DIM: usize, const NODES: usize, const AGENTS: usize> Source<
     }
 
     /// The jet without what other agents' jets of the same node count too: how everyone's figures change with time.
+    #[inline(always)]
     fn shared<const M: usize>(&self, mut jet: Jet<T, M>, at: &At<'_, T>) -> Jet<T, M> {
+        if M == DIM {
+            // Positions are no one else's.
+            return jet;
+        }
         let Some(time) = at.variables.time.filter(|&time| time < M && self.frame.agents > 1) else { return jet };
         let part = T::one() / T::from_count(self.frame.agents);
         jet.gradient[time] *= part;

@@ -18,8 +18,7 @@ impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
         needs
     }
 
-    fn slopes(&self, _: usize, values: &Values<T>) -> Slopes<T> {
-        let mut slopes = Slopes::new();
+    fn add_slopes(&self, _: usize, values: &Values<T>, slopes: &mut Slopes<T>) {
         for limit in self.scenario.limits {
             let Some(value) = values.get(limit.metric) else { continue };
             let (mut first, mut second) = (T::zero(), T::zero());
@@ -30,6 +29,5 @@ impl<T: Real, const DIM: usize> Weigh<T> for Limits<'_, T, DIM> {
             }
             let _ = slopes.push(Slope { metric: limit.metric, first, second });
         }
-        slopes
     }
 }
