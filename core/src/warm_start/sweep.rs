@@ -17,8 +17,11 @@ use crate::math::{Point, Real, norm_squared};
 
 use super::grid::{Grid, Move};
 
-/// Cells that are done together.
+/// Cells that are done together,
 const CHUNK: usize = 32;
+/// and without a loop over them, where any of them may be entered: rows are hardly longer, and a loop over what is left of one
+/// takes longer than all that is done for it.
+const LANES: usize = 8;
 /// Whether patches are smaller than their blocks; where code is to be small they are not.
 const HAS_ROWS: bool = !cfg!(feature = "compact");
 /// Rows of a patch that know where they begin and end.
@@ -265,12 +268,56 @@ impl Sweep<'_> {
                 let mut cell = row * across + low;
                 let mut left = high.saturating_sub(low);
                 while left > 0 {
-                    let length = left.min(CHUNK);
-                    self.relax((number, step, weight), cell, length, clear.as_mut());
+                    let relaxed = (number, step, weight);
+                    let mut length = left.min(LANES);
+                    let is_done =
+                        clear.is_none() && HAS_ROWS && self.relax_lanes(relaxed, cell, length).is_some();
+                    if !is_done {
+                        length = left.min(CHUNK);
+                        self.relax(relaxed, cell, length, clear.as_mut());
+                    }
                     (cell, left) = (cell + length, left - length);
                 }
             }
         }
+    }
+
+    /// One move to `length` cells from `first` on, [`LANES`] at the most; `None` where the lists end before as many.
+    #[inline(always)]
+    fn relax_lanes(
+        &mut self,
+        (number, step, weight): (u8, &Move, f32),
+        first: usize,
+        length: usize,
+    ) -> Option<()> {
+        let from = step.origin(first);
+        let row = |at: usize| self.landscape.get(at..)?.first_chunk::<LANES>();
+        let (near, far) = (row(first)?, row(from)?);
+        let mut totals = [0.0; LANES];
+        for lane in 0..LANES {
+            totals[lane] = (near[lane] + far[lane]) * 0.5;
+        }
+        for back in step.between() {
+            let rates = row(first.wrapping_add_signed(back))?;
+            for lane in 0..LANES {
+                totals[lane] += rates[lane];
+            }
+        }
+        let before = self.cost.get(from..)?.first_chunk::<LANES>()?;
+        let next = self.next.get_mut(first..)?.first_chunk_mut::<LANES>()?;
+        let parents = self.parents.get_mut(first..)?.first_chunk_mut::<LANES>()?;
+        // Whole lists in and out, and no choice between: no lane waits for another.
+        let (mut best, mut by) = (*next, *parents);
+        for lane in 0..LANES {
+            totals[lane] = before[lane] + totals[lane] * weight;
+        }
+        for lane in 0..LANES {
+            let is_better = (totals[lane] < best[lane]) & (lane < length);
+            best[lane] = if is_better { totals[lane] } else { best[lane] };
+            by[lane] = if is_better { number } else { by[lane] };
+        }
+        (*next, *parents) = (best, by);
+        Some(())
     }
 
     /// One move to a row of cells from `first` on; `weight` is what the sum of the rates on its way counts, s.
