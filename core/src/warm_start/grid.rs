@@ -12,10 +12,12 @@
 use crate::math::{Point, Real, norm, norm_squared};
 use crate::scenario::Domain;
 
+use super::sweep::Block;
+
 /// Moves that a parent entry can tell apart.
 pub(super) const MOVES_MAX: usize = 255;
 /// Cells between the ends of a move that its cost looks at.
-const BETWEEN_MAX: usize = 5;
+pub(super) const BETWEEN_MAX: usize = 5;
 /// Dimensions there can be.
 const DIM_MAX: usize = 3;
 /// Part by which cells grow until they are few enough, and how often.
@@ -270,11 +272,23 @@ impl Move {
         to.wrapping_add_signed(-isize::from(self.jump))
     }
 
-    /// Rows of `across` cells, and cells along a row.
-    pub(super) fn by_rows(&self, across: usize) -> (isize, isize) {
+    /// Rows, and cells along a row.
+    pub(super) fn by_rows<const DIM: usize>(&self, counts: &[usize; DIM]) -> (isize, isize) {
         let [ahead, ..] = self.offset.map(isize::from);
-        let across = isize::try_from(across.max(1)).unwrap_or(isize::MAX);
-        ((isize::from(self.jump) - ahead) / across, ahead)
+        let (mut aside, mut stride) = (0, 1);
+        for (&cells, &count) in self.offset.iter().zip(counts).skip(1) {
+            aside += isize::from(cells) * stride;
+            stride *= isize::try_from(count).unwrap_or(isize::MAX);
+        }
+        (aside, ahead)
+    }
+
+    /// Whether the move into a row comes from one of a block; the first coordinate is that of no row.
+    pub(super) fn comes_from<const DIM: usize>(&self, at: &[usize; DIM], block: &Block<DIM>) -> bool {
+        (1..DIM.min(DIM_MAX)).all(|axis| {
+            let from = at[axis].wrapping_add_signed(-isize::from(self.offset[axis]));
+            block.low[axis] <= from && from <= block.high[axis]
+        })
     }
 
     /// Cells by axis.
@@ -283,7 +297,7 @@ impl Move {
     }
 
     /// Changes of the cell's number back from the end to each of the cells between.
-    pub(super) fn between(&self) -> impl Iterator<Item = isize> {
+    pub(super) fn between(&self) -> impl ExactSizeIterator<Item = isize> {
         self.back.iter().take(usize::from(self.between)).map(|&back| isize::from(back))
     }
 }

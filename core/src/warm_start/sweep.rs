@@ -15,13 +15,22 @@ use heapless::Vec;
 
 use crate::math::{Point, Real, norm_squared};
 
-use super::grid::{Grid, Move};
+use super::grid::{BETWEEN_MAX, Grid, Move};
 
-/// Cells that are done together,
+/// Cells that are done together, move by move.
 const CHUNK: usize = 32;
-/// and without a loop over them, where any of them may be entered: rows are hardly longer, and a loop over what is left of one
-/// takes longer than all that is done for it.
+/// Cells that take all moves in turn, where any move is open: rows are hardly longer.
 const LANES: usize = 8;
+/// As many infinities, as many zeros, and as many infinities.
+const FRAME: [f32; 3 * LANES] = {
+    let mut frame = [f32::INFINITY; 3 * LANES];
+    let mut lane = 0;
+    while lane < LANES {
+        frame[LANES + lane] = 0.0;
+        lane += 1;
+    }
+    frame
+};
 /// Whether patches are smaller than their blocks; where code is to be small they are not.
 const HAS_ROWS: bool = !cfg!(feature = "compact");
 /// Rows of a patch that know where they begin and end.
@@ -109,7 +118,7 @@ impl<const DIM: usize> Block<DIM> {
     /// Its cells.
     pub(super) fn cells(&self, counts: &[usize; DIM]) -> impl Iterator<Item = usize> + use<DIM> {
         let ([low, high], across) = (self.across(), counts.first().copied().unwrap_or(1));
-        self.rows(counts).flat_map(move |row| row * across + low..row * across + high)
+        self.rows(counts).flat_map(move |(row, _)| row * across + low..row * across + high)
     }
 
     /// Its first coordinates, from the lowest to the one after the highest.
@@ -119,7 +128,7 @@ impl<const DIM: usize> Block<DIM> {
     }
 }
 
-/// Numbers of a block's rows, one after the other.
+/// A block's rows, one after the other: number, and coordinates of the first cell.
 pub(super) struct Rows<const DIM: usize> {
     block: Block<DIM>,
     counts: [usize; DIM],
@@ -128,12 +137,12 @@ pub(super) struct Rows<const DIM: usize> {
 }
 
 impl<const DIM: usize> Iterator for Rows<DIM> {
-    type Item = usize;
+    type Item = (usize, [usize; DIM]);
 
     #[cfg_attr(feature = "compact", inline(never))]
-    fn next(&mut self) -> Option<usize> {
+    fn next(&mut self) -> Option<(usize, [usize; DIM])> {
         self.left = self.left.checked_sub(1)?;
-        let row = row_of(&self.next, &self.counts);
+        let (row, at) = (row_of(&self.next, &self.counts), self.next);
         for axis in 1..DIM {
             if self.next[axis] < self.block.high[axis] {
                 self.next[axis] += 1;
@@ -141,7 +150,7 @@ impl<const DIM: usize> Iterator for Rows<DIM> {
             }
             self.next[axis] = self.block.low[axis];
         }
-        Some(row)
+        Some((row, at))
     }
 }
 
@@ -251,12 +260,15 @@ impl Sweep<'_> {
         mut clear: Option<impl FnMut(usize, usize) -> bool>,
     ) {
         let across = counts.first().copied().unwrap_or(1);
+        if HAS_ROWS && clear.is_none() {
+            return self.run_open(counts, moves, (alive, wanted));
+        }
         for (number, step) in (0..=u8::MAX).zip(moves) {
             let moved = alive.block.moved(step, counts).and_then(|moved| moved.meet(&wanted.block));
             let Some(to) = moved else { continue };
             let weight = self.interval / f32::from_count(step.between().count() + 1);
-            let (aside, ahead) = if HAS_ROWS { step.by_rows(across) } else { (0, 0) };
-            for row in to.rows(counts) {
+            let (aside, ahead) = if HAS_ROWS { step.by_rows(counts) } else { (0, 0) };
+            for (row, _) in to.rows(counts) {
                 let [mut low, mut high] = to.across();
                 if HAS_ROWS {
                     let from = alive.range(row.wrapping_add_signed(-aside));
@@ -268,56 +280,88 @@ impl Sweep<'_> {
                 let mut cell = row * across + low;
                 let mut left = high.saturating_sub(low);
                 while left > 0 {
-                    let relaxed = (number, step, weight);
-                    let mut length = left.min(LANES);
-                    let is_done =
-                        clear.is_none() && HAS_ROWS && self.relax_lanes(relaxed, cell, length).is_some();
-                    if !is_done {
-                        length = left.min(CHUNK);
-                        self.relax(relaxed, cell, length, clear.as_mut());
-                    }
+                    let length = left.min(CHUNK);
+                    self.relax((number, step, weight), cell, length, clear.as_mut());
                     (cell, left) = (cell + length, left - length);
                 }
             }
         }
     }
 
-    /// One move to `length` cells from `first` on, [`LANES`] at the most; `None` where the lists end before as many.
-    #[inline(always)]
-    fn relax_lanes(
+    /// The same where every move is open: cell by cell, eight at once, each with all moves in turn, so that the best so far need
+    /// not be stored before the next.
+    fn run_open<const DIM: usize>(
         &mut self,
-        (number, step, weight): (u8, &Move, f32),
-        first: usize,
-        length: usize,
-    ) -> Option<()> {
-        let from = step.origin(first);
-        let row = |at: usize| self.landscape.get(at..)?.first_chunk::<LANES>();
-        let (near, far) = (row(first)?, row(from)?);
-        let mut totals = [0.0; LANES];
-        for lane in 0..LANES {
-            totals[lane] = (near[lane] + far[lane]) * 0.5;
-        }
-        for back in step.between() {
-            let rates = row(first.wrapping_add_signed(back))?;
-            for lane in 0..LANES {
-                totals[lane] += rates[lane];
+        counts: &[usize; DIM],
+        moves: &[Move],
+        (alive, wanted): (&Patch<DIM>, &Patch<DIM>),
+    ) {
+        let across = counts.first().copied().unwrap_or(1);
+        let weights = core::array::from_fn(|between| self.interval / f32::from_count(between + 1));
+        for (row, at) in wanted.block.rows(counts) {
+            let [mut begin, high] = wanted.range(row);
+            while begin < high {
+                let end = high.min(begin + LANES);
+                self.take_least(((row, row * across), &at, [begin, end]), moves, alive, (counts, &weights));
+                begin = end;
             }
         }
-        let before = self.cost.get(from..)?.first_chunk::<LANES>()?;
-        let next = self.next.get_mut(first..)?.first_chunk_mut::<LANES>()?;
-        let parents = self.parents.get_mut(first..)?.first_chunk_mut::<LANES>()?;
-        // Whole lists in and out, and no choice between: no lane waits for another.
-        let (mut best, mut by) = (*next, *parents);
-        for lane in 0..LANES {
-            totals[lane] = before[lane] + totals[lane] * weight;
+    }
+
+    /// Enters the least of all moves to the cells `begin..end` of a row, [`LANES`] at the most.
+    #[inline(always)]
+    fn take_least<const DIM: usize>(
+        &mut self,
+        ((row, first), at, [begin, end]): ((usize, usize), &[usize; DIM], [usize; 2]),
+        moves: &[Move],
+        alive: &Patch<DIM>,
+        (counts, weights): (&[usize; DIM], &[f32; BETWEEN_MAX + 1]),
+    ) {
+        // The last cells of a list are done with some before them.
+        let last = self.next.len().min(self.parents.len()).saturating_sub(LANES);
+        let cell = (first + begin).min(last);
+        let shift = first + begin - cell;
+        let near = fetch(self.landscape, cell);
+        let (mut best, mut by) = (fetch(self.next, cell), [u32::MAX; LANES]);
+        for (number, step) in (0_u32..).zip(moves) {
+            if !step.comes_from(at, &alive.block) {
+                continue;
+            }
+            let (aside, ahead) = step.by_rows(counts);
+            let [low, high] = alive.range(row.wrapping_add_signed(-aside)).map(|cell| cell.saturating_add_signed(ahead));
+            let (low, high) = (low.max(begin), high.min(end));
+            if low >= high {
+                continue;
+            }
+            let origin = step.origin(cell);
+            let (far, before) = (fetch(self.landscape, origin), fetch(self.cost, origin));
+            let mut totals = [0.0; LANES];
+            for lane in 0..LANES {
+                totals[lane] = (near[lane] + far[lane]) * 0.5;
+            }
+            let between = step.between();
+            let weight = weights[between.len().min(BETWEEN_MAX)];
+            for back in between {
+                let rates = fetch(self.landscape, cell.wrapping_add_signed(back));
+                for lane in 0..LANES {
+                    totals[lane] += rates[lane];
+                }
+            }
+            // Infinite where the lane is before the first cell, and where it is past the last.
+            let early = fetch(&FRAME, (LANES + begin).wrapping_sub(low + shift));
+            let late = fetch(&FRAME, (2 * LANES + begin).wrapping_sub(high + shift));
+            for lane in 0..LANES {
+                let total = before[lane] + totals[lane] * weight + (early[lane] + late[lane]);
+                let is_better = total < best[lane];
+                best[lane] = if is_better { total } else { best[lane] };
+                by[lane] = if is_better { number } else { by[lane] };
+            }
         }
-        for lane in 0..LANES {
-            let is_better = (totals[lane] < best[lane]) & (lane < length);
-            best[lane] = if is_better { totals[lane] } else { best[lane] };
-            by[lane] = if is_better { number } else { by[lane] };
+        let cells = self.next.iter_mut().zip(self.parents.iter_mut()).skip(cell);
+        for ((next, parent), (best, by)) in cells.zip(best.into_iter().zip(by)) {
+            *next = best;
+            *parent = u8::try_from(by).unwrap_or(*parent);
         }
-        (*next, *parents) = (best, by);
-        Some(())
     }
 
     /// One move to a row of cells from `first` on; `weight` is what the sum of the rates on its way counts, s.
@@ -355,6 +399,19 @@ impl Sweep<'_> {
             }
         }
     }
+}
+
+/// The entries of a list from `at` on; infinity past its end.
+#[inline(always)]
+fn fetch(list: &[f32], at: usize) -> [f32; LANES] {
+    let found = list.get(at..).and_then(|rest| rest.first_chunk::<LANES>());
+    found.copied().unwrap_or_else(|| fetch_edge(list, at))
+}
+
+#[cold]
+#[inline(never)]
+fn fetch_edge(list: &[f32], at: usize) -> [f32; LANES] {
+    core::array::from_fn(|lane| list.get(at.wrapping_add(lane)).copied().unwrap_or(f32::INFINITY))
 }
 
 /// Enters a move where its total is less than the best so far.
