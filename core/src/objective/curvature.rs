@@ -201,9 +201,11 @@ where
         let is_common = focus.direct == Variables::POSITION && emitters.is_empty();
         let own = if is_common && !cfg!(feature = "compact") {
             let focus = Focus { direct: Variables::POSITION, emitter: 0, emission: Variables::POSITION };
-            Part { focus: &focus, emitters: &[], ..part }.jet(slopes, scratch)
+            Part { focus: &focus, emitters: &[], ..part }.jet::<M, false>(slopes, scratch)
+        } else if M >= 2 * DIM && part.is_apart() && !cfg!(feature = "compact") {
+            part.any_jet::<M, true>(&slopes, scratch)
         } else {
-            part.any_jet(&slopes, scratch)
+            part.any_jet::<M, false>(&slopes, scratch)
         };
         sum.add(&own, T::one());
     }
@@ -220,18 +222,24 @@ struct Part<'a, T, const DIM: usize> {
 }
 
 impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
+    /// Whether the first variables are the position, and those after them a reference point of its own.
+    fn is_apart(&self) -> bool {
+        let direct = &self.focus.direct;
+        self.situation.reference.is_some() && (direct.position, direct.reference) == (Some(0), Some(DIM))
+    }
+
     /// Compiled once, whatever the slopes.
     #[inline(never)]
-    fn any_jet<const M: usize>(
+    fn any_jet<const M: usize, const APART: bool>(
         &self,
         slopes: &dyn Fn(&Values<T>, &mut Slopes<T>),
         scratch: &mut [Sample<T, DIM>],
     ) -> Jet<T, M> {
-        self.jet(slopes, scratch)
+        self.jet::<M, APART>(slopes, scratch)
     }
 
     #[inline(always)]
-    fn jet<const M: usize>(
+    fn jet<const M: usize, const APART: bool>(
         &self,
         add_slopes: impl Fn(&Values<T>, &mut Slopes<T>),
         scratch: &mut [Sample<T, DIM>],
@@ -267,7 +275,7 @@ impl<T: Real, const DIM: usize> Part<'_, T, DIM> {
         sum.add(&alarmed, adjoint.false_alarm);
         let located = covariance.map(|covariance| {
             let around = Around { situation, emitters, softening: scenario.frame.softening, focus };
-            location(covariance, &around, scenario.sensors, scratch, &adjoint.location)
+            location::<_, _, _, APART>(covariance, &around, scenario.sensors, scratch, &adjoint.location)
         });
         if let Some(located) = &located {
             for a in 0..M {

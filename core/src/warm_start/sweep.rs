@@ -328,7 +328,8 @@ impl Sweep<'_> {
                 continue;
             }
             let (aside, ahead) = step.by_rows(counts);
-            let [low, high] = alive.range(row.wrapping_add_signed(-aside)).map(|cell| cell.saturating_add_signed(ahead));
+            let [low, high] =
+                alive.range(row.wrapping_add_signed(-aside)).map(|cell| cell.saturating_add_signed(ahead));
             let (low, high) = (low.max(begin), high.min(end));
             if low >= high {
                 continue;

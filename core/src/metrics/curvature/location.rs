@@ -105,9 +105,23 @@ impl<T: Real, const DIM: usize, const M: usize> Dependence<T, DIM, M> {
     }
 }
 
+/// Whether a variable changes weights: with a reference point of its own, `APART`, that one's components, which come after those
+/// of the position, do not.
+const fn weighs<const DIM: usize, const APART: bool>(a: usize) -> bool {
+    !APART || a < DIM || a >= 2 * DIM
+}
+
+/// Whether a variable changes directions: with a reference point of its own, the position does not.
+const fn turns<const DIM: usize, const APART: bool>(a: usize) -> bool {
+    !APART || a >= DIM
+}
+
 /// Derivatives of the logarithms, second ones weighed by `adjoint`; samples must be as the way forward left them.
+///
+/// `APART` promises that the first variables are the position, those after them a reference point of its own: what is zero then
+/// is not computed.
 #[inline(always)]
-pub(crate) fn location<T: Real, const DIM: usize, const M: usize>(
+pub(crate) fn location<T: Real, const DIM: usize, const M: usize, const APART: bool>(
     covariance: &Covariance<T, DIM>,
     around: &Around<'_, T, DIM>,
     sensors: &[StoredSensor<T, DIM>],
@@ -135,8 +149,9 @@ pub(crate) fn location<T: Real, const DIM: usize, const M: usize>(
             let bent = covariance.pulled(&pull);
             let ln_weight = ln_weight(sensor, model, sample, (around, &dependence));
             let mut sensed = Sensed { ln_weight, direction: [Point::zeros(); M] };
-            let directions = directions(covariance, sample, &dependence, &bent, &mut sensed.direction);
-            sums.include(sample, &sensed, &directions, &kernel, &pull, by_sum);
+            let directions =
+                directions::<_, _, _, APART>(covariance, sample, &dependence, &bent, &mut sensed.direction);
+            sums.include::<APART>(sample, &sensed, &directions, &kernel, &pull, by_sum);
         }
     }
     sums.close(covariance, adjoint, by_trace, location.variance_sum)
@@ -227,7 +242,7 @@ fn jam_factor<T: Real, const DIM: usize, const M: usize>(
 /// With n = 1 / d(r0, y) and R_a the derivative of r0 - y: f_a = n (R_a - f (f.R_a)), and f_ab.k = n^2
 /// [3 (f.k) (f.R_a) (f.R_b) - (f.R_a) (k.R_b) - (f.R_b) (k.R_a) - (f.k) (R_a.R_b)].
 #[inline(always)]
-fn directions<T: Real, const DIM: usize, const M: usize>(
+fn directions<T: Real, const DIM: usize, const M: usize, const APART: bool>(
     covariance: &Covariance<T, DIM>,
     sample: &Sample<T, DIM>,
     dependence: &Dependence<T, DIM, M>,
@@ -241,7 +256,7 @@ fn directions<T: Real, const DIM: usize, const M: usize>(
     let along_pull = sample.direction.dot(pull);
     let mut along = [T::zero(); M];
     let mut across = [T::zero(); M];
-    for a in 0..M {
+    for a in (0..M).filter(|&a| turns::<DIM, APART>(a)) {
         along[a] = sample.direction.dot(&columns[a]);
         across[a] = pull.dot(&columns[a]);
         let turned = columns[a] - sample.direction * along[a];
@@ -249,7 +264,7 @@ fn directions<T: Real, const DIM: usize, const M: usize>(
     }
     let square = near * near;
     let three = T::real(3.0);
-    for a in 0..M {
+    for a in (0..M).filter(|&a| turns::<DIM, APART>(a)) {
         let by_along = (three * along_pull * along[a] - across[a]) * square;
         let by_across = -along[a] * square;
         let by_both = -along_pull * square;
@@ -262,7 +277,7 @@ fn directions<T: Real, const DIM: usize, const M: usize>(
 
 impl<T: Real, const DIM: usize, const M: usize> Sums<T, DIM, M> {
     #[inline(always)]
-    fn include(
+    fn include<const APART: bool>(
         &mut self,
         sample: &Sample<T, DIM>,
         sensed: &Sensed<T, DIM, M>,
@@ -283,12 +298,20 @@ impl<T: Real, const DIM: usize, const M: usize> Sums<T, DIM, M> {
         let twice = T::real(2.0) * weight;
         let mut aside = [Point::<T, DIM>::zeros(); M];
         for a in 0..M {
-            let growth = sensed.direction[a] + residual * slopes[a];
+            let direction = &sensed.direction[a];
+            // w (l r r^T + f r^T + r f^T), the first one split between the other two.
+            let (growth, both) = if !weighs::<DIM, APART>(a) {
+                (*direction, *direction)
+            } else if turns::<DIM, APART>(a) {
+                (direction + residual * slopes[a], direction + residual * (T::real(0.5) * slopes[a]))
+            } else {
+                (residual * slopes[a], residual * (T::real(0.5) * slopes[a]))
+            };
+            if weighs::<DIM, APART>(a) {
+                self.variance[a] -= sample.variance * slopes[a];
+            }
             aside[a] = growth - self.mean[a];
             self.mean[a] += aside[a] * share;
-            self.variance[a] -= sample.variance * slopes[a];
-            // w (l r r^T + f r^T + r f^T), the first one split between the other two.
-            let both = sensed.direction[a] + residual * (T::real(0.5) * slopes[a]);
             for k in 0..DIM {
                 for l in k..DIM {
                     self.information[a][k][l] += weight * (both[k] * residual[l] + residual[k] * both[l]);
@@ -298,9 +321,15 @@ impl<T: Real, const DIM: usize, const M: usize> Sums<T, DIM, M> {
         for a in 0..M {
             let pulled = kernel.times(&aside[a]) * about;
             for b in a..M {
-                let squares = slopes[a] * slopes[b];
-                let bent = sensed.ln_weight.hessian[a][b] - squares;
-                self.hessian[a][b] -= (fit + of_variance) * bent + twice * directions[a][b] + pulled.dot(&aside[b]);
+                let mut bend = pulled.dot(&aside[b]);
+                if weighs::<DIM, APART>(a) && weighs::<DIM, APART>(b) {
+                    let squares = slopes[a] * slopes[b];
+                    bend += (fit + of_variance) * (sensed.ln_weight.hessian[a][b] - squares);
+                }
+                if turns::<DIM, APART>(a) && turns::<DIM, APART>(b) {
+                    bend += twice * directions[a][b];
+                }
+                self.hessian[a][b] -= bend;
             }
         }
     }
