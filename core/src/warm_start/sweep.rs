@@ -118,7 +118,7 @@ impl<const DIM: usize> Block<DIM> {
     /// Its cells.
     pub(super) fn cells(&self, counts: &[usize; DIM]) -> impl Iterator<Item = usize> + use<DIM> {
         let ([low, high], across) = (self.across(), counts.first().copied().unwrap_or(1));
-        self.rows(counts).flat_map(move |(row, _)| row * across + low..row * across + high)
+        self.rows(counts).flat_map(move |row| row * across + low..row * across + high)
     }
 
     /// Its first coordinates, from the lowest to the one after the highest.
@@ -128,7 +128,7 @@ impl<const DIM: usize> Block<DIM> {
     }
 }
 
-/// A block's rows, one after the other: number, and coordinates of the first cell.
+/// Numbers of a block's rows, one after the other.
 pub(super) struct Rows<const DIM: usize> {
     block: Block<DIM>,
     counts: [usize; DIM],
@@ -136,13 +136,12 @@ pub(super) struct Rows<const DIM: usize> {
     left: usize,
 }
 
-impl<const DIM: usize> Iterator for Rows<DIM> {
-    type Item = (usize, [usize; DIM]);
-
-    #[cfg_attr(feature = "compact", inline(never))]
-    fn next(&mut self) -> Option<(usize, [usize; DIM])> {
+impl<const DIM: usize> Rows<DIM> {
+    /// Coordinates of the first cell of the next row.
+    #[inline(always)]
+    fn advance(&mut self) -> Option<[usize; DIM]> {
         self.left = self.left.checked_sub(1)?;
-        let (row, at) = (row_of(&self.next, &self.counts), self.next);
+        let at = self.next;
         for axis in 1..DIM {
             if self.next[axis] < self.block.high[axis] {
                 self.next[axis] += 1;
@@ -150,7 +149,17 @@ impl<const DIM: usize> Iterator for Rows<DIM> {
             }
             self.next[axis] = self.block.low[axis];
         }
-        Some((row, at))
+        Some(at)
+    }
+}
+
+impl<const DIM: usize> Iterator for Rows<DIM> {
+    type Item = usize;
+
+    #[cfg_attr(feature = "compact", inline(never))]
+    fn next(&mut self) -> Option<usize> {
+        let at = self.advance()?;
+        Some(row_of(&at, &self.counts))
     }
 }
 
@@ -268,7 +277,7 @@ impl Sweep<'_> {
             let Some(to) = moved else { continue };
             let weight = self.interval / f32::from_count(step.between().count() + 1);
             let (aside, ahead) = if HAS_ROWS { step.by_rows(counts) } else { (0, 0) };
-            for (row, _) in to.rows(counts) {
+            for row in to.rows(counts) {
                 let [mut low, mut high] = to.across();
                 if HAS_ROWS {
                     let from = alive.range(row.wrapping_add_signed(-aside));
@@ -298,7 +307,9 @@ impl Sweep<'_> {
     ) {
         let across = counts.first().copied().unwrap_or(1);
         let weights = core::array::from_fn(|between| self.interval / f32::from_count(between + 1));
-        for (row, at) in wanted.block.rows(counts) {
+        let mut rows = wanted.block.rows(counts);
+        while let Some(at) = rows.advance() {
+            let row = row_of(&at, counts);
             let [mut begin, high] = wanted.range(row);
             while begin < high {
                 let end = high.min(begin + LANES);
