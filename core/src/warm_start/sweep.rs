@@ -6,8 +6,9 @@
 //! | | [`Lens`] | length unit | what a path can reach from the start and still reach the goal from |
 //! | | [`Patch`] | cells | what of a block is in a lens |
 //!
-//! Moves come first and cells second: a move does the same to a whole row of cells, one after the other in memory, which is
-//! what processors with vectors are quick at.
+//! A move does the same to a whole row of cells, one after the other in memory, which is what processors with vectors are quick
+//! at. Where every move is open, [`LANES`] cells of a row take all moves in turn; where they must be asked one by one, or code is
+//! to be small, a move takes all rows.
 //!
 //! Limits: rows past [`ROWS_MAX`] are as wide as the block, which is a box around what can be reached.
 
