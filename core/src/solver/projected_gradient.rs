@@ -66,8 +66,7 @@ where
     if !ledger.best.finite() {
         return Status::NonFinite;
     }
-    let before = ledger.iterations;
-    Stages { scenario, settings, frame: &frame, before }.run(workspace, ledger, deadline)
+    Stages::of(scenario, settings, &frame, ledger).run(workspace, ledger, deadline)
 }
 
 /// Leads `workspace.best`, which must be feasible but for regions and limits, clear of these, and [`AWAY`] iterations away from
@@ -84,12 +83,11 @@ where
 {
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
     begin(scenario, &frame, workspace, ledger);
-    let before = ledger.iterations;
-    let stages = Stages { scenario, settings, frame: &frame, before };
+    let stages = Stages::of(scenario, settings, &frame, ledger);
     if !ledger.best.finite() || stages.restore(workspace, ledger, deadline).is_some() {
         return false;
     }
-    let quota = (ledger.iterations + AWAY).min(before + settings.iterations);
+    let quota = (ledger.iterations + AWAY).min(stages.before + settings.iterations);
     stages.descent(stages.merit(Extreme::Exact, BARRIER[0], ledger), quota).run(workspace, ledger, deadline);
     true
 }
@@ -119,23 +117,33 @@ struct Stages<'a, T, const DIM: usize, const AGENTS: usize> {
     scenario: &'a View<'a, T, DIM>,
     settings: &'a Settings<T>,
     frame: &'a Frame<T, DIM, AGENTS>,
+    /// Whether there are regions or limits.
+    is_guarded: bool,
     /// Iterations that were done before.
     before: usize,
 }
 
-impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> {
+impl<'a, T: Real, const DIM: usize, const AGENTS: usize> Stages<'a, T, DIM, AGENTS> {
+    fn of(
+        scenario: &'a View<'a, T, DIM>,
+        settings: &'a Settings<T>,
+        frame: &'a Frame<T, DIM, AGENTS>,
+        ledger: &Ledger<T>,
+    ) -> Self {
+        Self { scenario, settings, frame, is_guarded: guard::is_needed(scenario), before: ledger.iterations }
+    }
+
     fn run<const NODES: usize, const SENSORS: usize>(
         &self,
         workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
         ledger: &mut Ledger<T>,
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
-        let is_guarded = guard::is_needed(self.scenario);
         let has_extremes = self.scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme);
-        if is_guarded && let Some(status) = self.restore(workspace, ledger, deadline) {
+        if self.is_guarded && let Some(status) = self.restore(workspace, ledger, deadline) {
             return status;
         }
-        let stages = if has_extremes || is_guarded { SHARPNESS.len() } else { 1 };
+        let stages = if has_extremes || self.is_guarded { SHARPNESS.len() } else { 1 };
         let before = ledger.iterations;
         let mut status = Status::IterationLimit;
         for (stage, (sharpness, weight)) in SHARPNESS.into_iter().zip(BARRIER).take(stages).enumerate() {
@@ -186,7 +194,7 @@ impl<T: Real, const DIM: usize, const AGENTS: usize> Stages<'_, T, DIM, AGENTS> 
     /// The objective, with a barrier of `weight` times it on regions and limits where there are any.
     fn merit(&self, extreme: Extreme<T>, weight: f64, ledger: &Ledger<T>) -> Merit<T> {
         let weight = T::real(weight) * ledger.best.abs().max(T::one());
-        let guard = if guard::is_needed(self.scenario) { Guard::Barrier { weight } } else { Guard::None };
+        let guard = if self.is_guarded { Guard::Barrier { weight } } else { Guard::None };
         Merit { extreme, objective: T::one(), guard }
     }
 
