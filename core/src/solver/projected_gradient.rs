@@ -140,7 +140,9 @@ impl<'a, T: Real, const DIM: usize, const AGENTS: usize> Stages<'a, T, DIM, AGEN
         deadline: &mut dyn FnMut() -> bool,
     ) -> Status {
         let has_extremes = self.scenario.terms.iter().any(|term| term.reduce == Reduce::Extreme);
-        if self.is_guarded && let Some(status) = self.restore(workspace, ledger, deadline) {
+        if self.is_guarded
+            && let Some(status) = self.restore(workspace, ledger, deadline)
+        {
             return status;
         }
         let stages = if has_extremes || self.is_guarded { SHARPNESS.len() } else { 1 };
