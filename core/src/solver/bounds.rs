@@ -93,10 +93,11 @@ impl<T: Real> Settings<T> {
             iterations: descended,
             refinements,
             factorizations: refinements * refine::SHIFTS_MAX,
-            // Its value for either, and for a refinement once more where an instant holds it up; the first gradient of every
-            // stage, then a line search each, and each success judged exactly.
-            evaluations: 3
-                + (1 + projected_gradient::STAGES_MAX)
+            // Its value for either, for what is cleared before, and for a refinement once more where an instant holds it up; the
+            // first gradient of every stage, of two more where it is cleared before, then a line search each, and each success
+            // judged exactly.
+            evaluations: 4
+                + (3 + projected_gradient::STAGES_MAX)
                 + descended * (self.line_search_steps + 1)
                 + refinements * (refine::HALVINGS_MAX + 1),
             projection_steps: descended * self.projection_steps,

@@ -70,26 +70,29 @@ where
 }
 
 /// Leads `workspace.best`, which must be feasible but for regions and limits, clear of these, and [`AWAY`] iterations away from
-/// them, where a refinement can begin; whether it is clear then.
+/// them, where a refinement can begin; `Some` if that fails.
 pub(super) fn clear<T, const DIM: usize, const NODES: usize, const SENSORS: usize, const AGENTS: usize>(
     scenario: &View<'_, T, DIM>,
     settings: &Settings<T>,
     workspace: &mut Workspace<T, DIM, NODES, SENSORS, AGENTS>,
     ledger: &mut Ledger<T>,
     deadline: &mut dyn FnMut() -> bool,
-) -> bool
+) -> Option<Status>
 where
     T: Real,
 {
     let frame = Frame::<T, DIM, AGENTS>::new(scenario, workspace.best.duration());
     begin(scenario, &frame, workspace, ledger);
+    if !ledger.best.finite() {
+        return Some(Status::NonFinite);
+    }
     let stages = Stages::of(scenario, settings, &frame, ledger);
-    if !ledger.best.finite() || stages.restore(workspace, ledger, deadline).is_some() {
-        return false;
+    if let Some(status) = stages.restore(workspace, ledger, deadline) {
+        return Some(status);
     }
     let quota = (ledger.iterations + AWAY).min(stages.before + settings.iterations);
     stages.descent(stages.merit(Extreme::Exact, BARRIER[0], ledger), quota).run(workspace, ledger, deadline);
-    true
+    None
 }
 
 /// Takes `workspace.best` for what a descent begins with.

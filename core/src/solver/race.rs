@@ -505,12 +505,16 @@ where
             return status;
         }
         // What keeps the refinement from beginning, as a rule, are regions and limits alone.
-        if guard::is_needed(scenario)
-            && !cfg!(feature = "compact")
-            && projected_gradient::clear(scenario, settings, workspace, ledger, deadline)
-            && let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline)
-        {
-            return status;
+        if guard::is_needed(scenario) && !cfg!(feature = "compact") {
+            if let Some(status) = projected_gradient::clear(scenario, settings, workspace, ledger, deadline) {
+                return status;
+            }
+            if let Some(status) = refine::polish(scenario, settings, workspace, ledger, deadline) {
+                return status;
+            }
+            // Iterations were taken to come here: with half of them for what is left, there are no more than of one descent.
+            let rest = Settings { iterations: settings.iterations / 2, ..*settings };
+            return improve(scenario, &rest, workspace, ledger, deadline);
         }
     }
     improve(scenario, settings, workspace, ledger, deadline)

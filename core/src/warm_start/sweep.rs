@@ -22,7 +22,8 @@ use super::grid::{BETWEEN_MAX, Grid, Move};
 const CHUNK: usize = 32;
 /// Cells that take all moves in turn, where any move is open: rows are hardly longer.
 const LANES: usize = 8;
-/// As many infinities, as many zeros, and as many infinities.
+/// Infinities, zeros and infinities, [`LANES`] of each: added to the lanes, a part of it keeps those out that are before a row's first
+/// cell or past its last, without a choice for each.
 const FRAME: [f32; 3 * LANES] = {
     let mut frame = [f32::INFINITY; 3 * LANES];
     let mut lane = 0;

@@ -140,8 +140,7 @@ fn one_sweep_finds_the_ways_of_all_flight_times() {
             compared += 1;
         }
     }
-    // The smaller core keeps two.
-    assert!(compared >= if cfg!(feature = "compact") { 2 } else { 3 }, "{compared} of {}", routes.len());
+    assert!(compared >= routes::ROUTES_MAX.min(3), "{compared} of {}", routes.len());
     let costs: List<f64> = routes.list.iter().map(|route| route.cost).collect();
     assert!(costs.is_sorted(), "{costs:?}");
 }
